@@ -1,0 +1,1 @@
+//! Constants of an arm that the certificates rest on.

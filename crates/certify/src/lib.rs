@@ -1,0 +1,1 @@
+//! A claim in, a certificate or a refusal with a counterexample out.

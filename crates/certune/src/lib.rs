@@ -1,0 +1,1 @@
+//! Certified tuning of robot-arm controllers.

@@ -1,0 +1,1 @@
+//! Plant, controller and task together: in time, and linearised.

@@ -1,0 +1,1 @@
+//! The active inference controller, MRAC and baselines as pure step functions.

@@ -1,0 +1,1 @@
+//! Robot descriptions, rigid-body algorithms and the Panda.

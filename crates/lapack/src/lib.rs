@@ -1,0 +1,1 @@
+//! The BLAS and LAPACK symbols clarabel's semidefinite cone links against, answered by faer.

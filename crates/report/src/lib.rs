@@ -1,0 +1,1 @@
+//! Records of a run to one self-contained page.

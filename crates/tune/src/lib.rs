@@ -1,0 +1,1 @@
+//! Search space, score and derivative-free search.

@@ -1,0 +1,1 @@
+//! Certificate file in, verdict out, by exact arithmetic.

@@ -1,0 +1,1 @@
+//! Numbered stories; see the `examples` targets.

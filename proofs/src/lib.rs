@@ -1,0 +1,1 @@
+//! The claims that CI re-derives.
