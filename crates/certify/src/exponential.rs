@@ -1,0 +1,136 @@
+//! The largest certified decay rate of the linearised loops, or a point of the box that contradicts stability.
+
+use certune_verify::{
+    Attained, BoxPoint, Claim, ClaimKind, Document, ExponentialClaim, Grade, LoopBox, NotProvedClaim, Number,
+    RefusedClaim, family_box, is_stable_at, loop_box_decays,
+};
+use num_rational::BigRational;
+use num_traits::Zero;
+
+use crate::problem::Problem;
+
+/// Rates are certified in steps of 1/1000 per second.
+const STEPS_PER_UNIT: u32 = 1000;
+/// No rate beyond this is tried, 1/s.
+const LARGEST_RATE_PER_S: u32 = 50;
+/// Points per axis when a counterexample is searched inside the box.
+const GRID: u32 = 24;
+
+/// The one-joint loop of an unstable eigenvector: `v*Mv`, `v*Dv`, `v*Gv` for `|v| = 1`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct UnstableLoop {
+    /// kg m^2.
+    pub inertia_kg_m2: f64,
+    /// N m s/rad.
+    pub friction_n_m_s_per_rad: f64,
+    /// N m/rad.
+    pub stiffness_n_m_per_rad: f64,
+}
+
+fn rate(steps: u32) -> Option<Number> {
+    format!("{}.{:03}", steps / STEPS_PER_UNIT, steps % STEPS_PER_UNIT).parse().ok()
+}
+
+/// The claim `exponential` with the largest rate that exact arithmetic certifies, or a refusal, or "not proved".
+///
+/// `attain` searches an arm and configuration of the family with an unstable linearised loop; it is asked only after the
+/// box has been found to hold an unstable point.
+pub fn exponential(problem: &Problem, attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>) -> Claim {
+    let document = problem.document();
+    let range = family_box(document);
+    let decays = |steps: u32| rate(steps).is_some_and(|r| loop_box_decays(document, r.value()).is_ok());
+    if !decays(1) {
+        return refuse(document, &range, attain);
+    }
+    // Stable at rate r implies stable at every smaller rate: bisect between a certified and a refused step.
+    let (mut certified, mut refused) = (1, STEPS_PER_UNIT * LARGEST_RATE_PER_S);
+    while refused - certified > 1 {
+        let middle = certified.midpoint(refused);
+        if decays(middle) {
+            certified = middle;
+        } else {
+            refused = middle;
+        }
+    }
+    match rate(certified) {
+        Some(rate_per_s) => {
+            Claim::Exponential(ExponentialClaim { statement: String::new(), grade: Grade::Conditional, rate_per_s })
+        }
+        None => not_proved("the rate cannot be written".to_owned()),
+    }
+}
+
+fn not_proved(reason: String) -> Claim {
+    Claim::NotProved(NotProvedClaim { statement: String::new(), of: ClaimKind::Exponential, distance: None, reason })
+}
+
+fn refuse(document: &Document, range: &LoopBox, attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>) -> Claim {
+    let zero = BigRational::zero();
+    let reason = match loop_box_decays(document, &zero) {
+        Ok(()) => return not_proved("stable, but at no rate of at least 0.001 per s".to_owned()),
+        Err(reason) => reason,
+    };
+    let unstable = |point: &BoxPoint| {
+        let values =
+            [&point.inertia_kg_m2, &point.friction_n_m_s_per_rad, &point.stiffness_n_m_per_rad].map(Number::value);
+        range.contains(values) && !is_stable_at(&document.gains, values, &zero)
+    };
+    let refused = |point: BoxPoint, attained: Option<Attained>| {
+        Claim::Refused(Box::new(RefusedClaim { statement: String::new(), rate_per_s: Number::zero(), point, attained }))
+    };
+    if document.gains.shared_by_all().is_err() {
+        return not_proved(reason);
+    }
+    if let Some((found, attained)) = attain()
+        && let Some(point) = as_point(found.inertia_kg_m2, found.friction_n_m_s_per_rad, found.stiffness_n_m_per_rad)
+            .map(|point| pulled_inside(point, range))
+        && unstable(&point)
+    {
+        return refused(point, Some(attained));
+    }
+    match grid(range).find(unstable) {
+        Some(point) => refused(point, None),
+        None => not_proved(format!("{reason}, and no unstable point was found in the box")),
+    }
+}
+
+fn as_point(m: f64, d: f64, g: f64) -> Option<BoxPoint> {
+    Some(BoxPoint {
+        inertia_kg_m2: Number::decimal(m)?,
+        friction_n_m_s_per_rad: Number::decimal(d)?,
+        stiffness_n_m_per_rad: Number::decimal(g)?,
+    })
+}
+
+/// Rounding may have moved a coordinate just past an end: put it on the end.
+fn pulled_inside(point: BoxPoint, range: &LoopBox) -> BoxPoint {
+    let pull = |x: Number, [lower, upper]: &[Number; 2]| {
+        if x.value() < lower.value() {
+            lower.clone()
+        } else if x.value() > upper.value() {
+            upper.clone()
+        } else {
+            x
+        }
+    };
+    BoxPoint {
+        inertia_kg_m2: pull(point.inertia_kg_m2, &range.inertia),
+        friction_n_m_s_per_rad: pull(point.friction_n_m_s_per_rad, &range.friction),
+        stiffness_n_m_per_rad: pull(point.stiffness_n_m_per_rad, &range.stiffness),
+    }
+}
+
+/// Corners first, then a grid that is geometric in the inertia.
+fn grid(range: &LoopBox) -> impl Iterator<Item = BoxPoint> {
+    let ends = |interval: &[Number; 2]| [interval[0].to_f64(), interval[1].to_f64()];
+    let (m, d, g) = (ends(&range.inertia), ends(&range.friction), ends(&range.stiffness));
+    let share = |k: u32| f64::from(k) / f64::from(GRID);
+    let linear = move |[lower, upper]: [f64; 2], k: u32| lower + (upper - lower) * share(k);
+    let corners = (0..8_usize).filter_map(move |k| as_point(m[k & 1], d[k >> 1 & 1], g[k >> 2]));
+    let inside = (0..=GRID).flat_map(move |i| {
+        (0..=GRID).flat_map(move |j| {
+            (0..=GRID).filter_map(move |k| as_point(m[0] * (m[1] / m[0]).powf(share(i)), linear(d, j), linear(g, k)))
+        })
+    });
+    corners.chain(inside)
+}

@@ -1,0 +1,195 @@
+//! Gains, family and constants of an arm, as the head of a document.
+//!
+//! Gains are the decimals a person wrote: the shortest decimal of an `f64` is that text whenever it has at most 15 digits. Constants are
+//! rounded outward to four significant digits, so that the document is readable and no weaker assumption is stated than was sampled.
+
+use certune_verify::{AicGains, Arm, Constants, Document, Evidence, Family, Number};
+
+/// Gains of the AIC, one number per joint.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AicGainValues {
+    /// Learning rate of the beliefs.
+    pub kappa_mu: Vec<f64>,
+    /// Learning rate of the torque.
+    pub kappa_a: Vec<f64>,
+    /// Variance of the position sensor.
+    pub sigma_q: Vec<f64>,
+    /// Variance of the velocity sensor.
+    pub sigma_dq: Vec<f64>,
+    /// Variance of the model of mu'.
+    pub sigma_mu: Vec<f64>,
+    /// Variance of the model of mu''.
+    pub sigma_dmu: Vec<f64>,
+    /// Time constant of the reference model, s.
+    pub reference_time_constant_s: Vec<f64>,
+}
+
+/// Which arm a problem is about.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArmValues {
+    /// Its name; characters other than letters, digits, `-`, `_` and `.` are written as `_`.
+    pub name: String,
+    /// Number of joints.
+    pub joints: usize,
+    /// SHA-256 of its description.
+    pub sha256: String,
+}
+
+/// Which plants a problem is about.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FamilyValues {
+    /// Whether the robot adds `g(q)` to the controller's torque.
+    pub gravity_compensation: bool,
+    /// Viscous friction of each joint, `[least, largest]`, N m s/rad.
+    pub friction_n_m_s_per_rad: [f64; 2],
+    /// Share by which link masses may differ from nominal.
+    pub mass_uncertainty: f64,
+    /// Payload, `[least, largest]`, kg.
+    pub payload_kg: [f64; 2],
+    /// Rotor inertia of each joint, `[least, largest]`, kg m^2.
+    pub rotor_inertia_kg_m2: [f64; 2],
+}
+
+/// Constants of the family found by sampling, the margin included.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SampledConstantValues {
+    /// Smallest inertia eigenvalue, kg m^2.
+    pub m_lo_kg_m2: f64,
+    /// Largest inertia eigenvalue, kg m^2.
+    pub m_hi_kg_m2: f64,
+    /// Largest gravity stiffness, N m/rad.
+    pub k_g_n_m_per_rad: f64,
+    /// Coriolis constant against `|dq|^2`, kg m^2.
+    pub k_c_kg_m2: f64,
+    /// Coriolis constant against `dq'M dq`.
+    pub k_r: f64,
+    /// Which configurations were sampled, in words.
+    pub over: String,
+    /// Share by which the constants were widened.
+    pub margin: f64,
+    /// Configurations sampled.
+    pub samples: usize,
+    /// Local maximisations.
+    pub local_starts: usize,
+}
+
+/// Why numbers make no problem.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ProblemError {
+    /// A number is NaN or infinite.
+    #[error("{quantity} is {value}, expected a finite number")]
+    NotFinite {
+        /// Name of the quantity.
+        quantity: &'static str,
+        /// The number.
+        value: f64,
+    },
+}
+
+/// A document without claims.
+#[derive(Clone, Debug)]
+pub struct Problem {
+    document: Document,
+}
+
+fn number(quantity: &'static str, value: f64) -> Result<Number, ProblemError> {
+    Number::decimal(value).ok_or(ProblemError::NotFinite { quantity, value })
+}
+
+fn numbers(quantity: &'static str, values: &[f64]) -> Result<Vec<Number>, ProblemError> {
+    values.iter().map(|&value| number(quantity, value)).collect()
+}
+
+fn interval(quantity: &'static str, [lower, upper]: [f64; 2]) -> Result<[Number; 2], ProblemError> {
+    Ok([number(quantity, lower)?, number(quantity, upper)?])
+}
+
+/// Four significant digits, moved up (`outward = 1`) or down (`outward = -1`) by one unit of the fourth.
+fn rounded(quantity: &'static str, value: f64, outward: f64) -> Result<Number, ProblemError> {
+    if value <= 0.0 {
+        return number(quantity, value);
+    }
+    let unit = 10_f64.powf(value.log10().floor() - 3.0);
+    let text = format!("{:.3e}", (value / unit + outward).round() * unit);
+    text.parse().map_err(|_| ProblemError::NotFinite { quantity, value })
+}
+
+impl Problem {
+    /// A problem from plain numbers.
+    ///
+    /// # Errors
+    /// [`ProblemError`] when a number is not finite. Whether gains are positive, intervals ordered and lists of the
+    /// right length is for the checker to say.
+    pub fn new(
+        arm: &ArmValues,
+        gains: &AicGainValues,
+        family: &FamilyValues,
+        constants: &SampledConstantValues,
+    ) -> Result<Self, ProblemError> {
+        let plain = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '_' };
+        let document = Document {
+            schema: 0,
+            arm: Arm {
+                name: arm.name.chars().map(plain).take(64).collect(),
+                joints: arm.joints,
+                sha256: arm.sha256.clone(),
+            },
+            gains: AicGains {
+                kappa_mu: numbers("kappa_mu", &gains.kappa_mu)?,
+                kappa_a: numbers("kappa_a", &gains.kappa_a)?,
+                sigma_q: numbers("sigma_q", &gains.sigma_q)?,
+                sigma_dq: numbers("sigma_dq", &gains.sigma_dq)?,
+                sigma_mu: numbers("sigma_mu", &gains.sigma_mu)?,
+                sigma_dmu: numbers("sigma_dmu", &gains.sigma_dmu)?,
+                reference_time_constant_s: numbers("reference_time_constant_s", &gains.reference_time_constant_s)?,
+            },
+            family: Family {
+                gravity_compensation: family.gravity_compensation,
+                friction_n_m_s_per_rad: interval("friction_n_m_s_per_rad", family.friction_n_m_s_per_rad)?,
+                mass_uncertainty: number("mass_uncertainty", family.mass_uncertainty)?,
+                payload_kg: interval("payload_kg", family.payload_kg)?,
+                rotor_inertia_kg_m2: interval("rotor_inertia_kg_m2", family.rotor_inertia_kg_m2)?,
+            },
+            constants: Constants {
+                m_lo_kg_m2: rounded("m_lo_kg_m2", constants.m_lo_kg_m2, -1.0)?,
+                m_hi_kg_m2: rounded("m_hi_kg_m2", constants.m_hi_kg_m2, 1.0)?,
+                k_g_n_m_per_rad: rounded("k_g_n_m_per_rad", constants.k_g_n_m_per_rad, 1.0)?,
+                k_c_kg_m2: rounded("k_c_kg_m2", constants.k_c_kg_m2, 1.0)?,
+                k_r: rounded("k_r", constants.k_r, 1.0)?,
+                evidence: Evidence::Sampled {
+                    over: constants.over.clone(),
+                    margin: number("margin", constants.margin)?,
+                    samples: constants.samples,
+                    local_starts: constants.local_starts,
+                },
+            },
+            claims: Vec::new(),
+            sha256: String::new(),
+        };
+        Ok(Self { document })
+    }
+
+    /// The document without claims.
+    pub fn document(&self) -> &Document {
+        &self.document
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn constants_are_rounded_outward() {
+        for value in [0.0044, 4.659, 69.28, 1.0, 9.9999, 123_456.0] {
+            assert!(rounded("x", value, 1.0).unwrap().to_f64() > value);
+            assert!(rounded("x", value, -1.0).unwrap().to_f64() < value);
+            assert!((rounded("x", value, 1.0).unwrap().to_f64() / value - 1.0).abs() < 3e-3);
+        }
+    }
+
+    #[test]
+    fn gains_keep_their_decimals() {
+        assert_eq!(number("kappa_mu", 11.67).unwrap().to_string(), "11.67");
+    }
+}

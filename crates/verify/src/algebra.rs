@@ -1,0 +1,339 @@
+//! Exact linear algebra and polynomials over the rationals.
+//!
+//! Sources: characteristic polynomial by Faddeev and LeVerrier; stability of a polynomial by Hurwitz determinants
+//! (Gantmacher, *Theory of Matrices*, vol. 2, ch. XV); real roots in an interval by Sturm's theorem; definiteness by LDL'.
+
+use num_rational::BigRational;
+use num_traits::{One, Signed, Zero};
+
+/// A dense square matrix, row by row.
+pub(crate) type Matrix = Vec<Vec<BigRational>>;
+
+pub(crate) fn zeros(order: usize) -> Matrix {
+    vec![vec![BigRational::zero(); order]; order]
+}
+
+/// Adds `x` at `(i, j)` and, off the diagonal, at `(j, i)`: a term `2 x v_i v_j` of a quadratic form.
+pub(crate) fn add_symmetric(matrix: &mut Matrix, i: usize, j: usize, x: &BigRational) {
+    matrix[i][j] += x;
+    if i != j {
+        matrix[j][i] += x;
+    }
+}
+
+/// The pivots of `L D L'`, or `None` at the first that is not positive: then the matrix is not positive definite.
+///
+/// The matrix must be symmetric; an asymmetric one is answered with `None`.
+pub(crate) fn positive_definite_pivots(matrix: &Matrix) -> Option<Vec<BigRational>> {
+    let order = matrix.len();
+    if order == 0 || matrix.iter().any(|row| row.len() != order) {
+        return None;
+    }
+    if (0..order).any(|i| (0..i).any(|j| matrix[i][j] != matrix[j][i])) {
+        return None;
+    }
+    let mut rest = matrix.clone();
+    let mut pivots = Vec::with_capacity(order);
+    for k in 0..order {
+        let pivot = rest[k][k].clone();
+        if !pivot.is_positive() {
+            return None;
+        }
+        for i in k + 1..order {
+            if rest[i][k].is_zero() {
+                continue;
+            }
+            let factor = &rest[i][k] / &pivot;
+            for j in i..order {
+                let change = &factor * &rest[j][k];
+                rest[j][i] -= &change;
+            }
+        }
+        pivots.push(pivot);
+    }
+    Some(pivots)
+}
+
+/// `det(s I - A)`, coefficients from the highest power down, the first being 1.
+pub(crate) fn characteristic_polynomial(a: &Matrix) -> Vec<BigRational> {
+    let order = a.len();
+    let mut coefficients = vec![BigRational::one()];
+    // Faddeev-LeVerrier: M_1 = A, c_k = -tr(M_k)/k, M_{k+1} = A (M_k + c_k I).
+    let mut product = a.clone();
+    for k in 1..=order {
+        let trace: BigRational = (0..order).map(|i| product[i][i].clone()).sum();
+        let coefficient = -trace / BigRational::from_integer(k.into());
+        for (i, row) in product.iter_mut().enumerate() {
+            row[i] += &coefficient;
+        }
+        if k < order {
+            product = multiply(a, &product);
+        }
+        coefficients.push(coefficient);
+    }
+    coefficients
+}
+
+fn multiply(x: &Matrix, y: &Matrix) -> Matrix {
+    let order = x.len();
+    let mut product = zeros(order);
+    for i in 0..order {
+        for k in 0..order {
+            if x[i][k].is_zero() {
+                continue;
+            }
+            for j in 0..order {
+                product[i][j] += &x[i][k] * &y[k][j];
+            }
+        }
+    }
+    product
+}
+
+fn determinant(mut matrix: Matrix) -> BigRational {
+    let order = matrix.len();
+    let mut value = BigRational::one();
+    for k in 0..order {
+        let Some(row) = (k..order).find(|&i| !matrix[i][k].is_zero()) else {
+            return BigRational::zero();
+        };
+        if row != k {
+            matrix.swap(row, k);
+            value = -value;
+        }
+        let pivot = matrix[k][k].clone();
+        for i in k + 1..order {
+            let factor = &matrix[i][k] / &pivot;
+            if factor.is_zero() {
+                continue;
+            }
+            for j in k..order {
+                let change = &factor * &matrix[k][j];
+                matrix[i][j] -= change;
+            }
+        }
+        value *= pivot;
+    }
+    value
+}
+
+/// The leading Hurwitz determinant of size `size` of `p`, coefficients from the highest power down.
+pub(crate) fn hurwitz_determinant(p: &[BigRational], size: usize) -> BigRational {
+    let mut matrix = zeros(size);
+    for (row, entries) in matrix.iter_mut().enumerate() {
+        for (column, entry) in entries.iter_mut().enumerate() {
+            // Entry (i, j), counted from 1, is the coefficient a_{2j - i}.
+            let index = (2 * (column + 1)).checked_sub(row + 1);
+            if let Some(coefficient) = index.and_then(|k| p.get(k)) {
+                entry.clone_from(coefficient);
+            }
+        }
+    }
+    determinant(matrix)
+}
+
+/// Whether every root of `p` (coefficients from the highest power down) has a negative real part.
+///
+/// Exact. A polynomial of degree 0 or with a leading coefficient that is not positive is answered with `false`: an empty
+/// set of roots would be vacuously stable.
+pub fn is_hurwitz(p: &[BigRational]) -> bool {
+    p.len() >= 2 && p[0].is_positive() && (1..p.len()).all(|size| hurwitz_determinant(p, size).is_positive())
+}
+
+/// A polynomial in one variable, coefficients from the constant up, without trailing zeros.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Polynomial(Vec<BigRational>);
+
+impl Polynomial {
+    pub(crate) fn new(mut coefficients: Vec<BigRational>) -> Self {
+        while coefficients.last().is_some_and(Zero::is_zero) {
+            coefficients.pop();
+        }
+        Self(coefficients)
+    }
+
+    /// The polynomial of degree below `values.len()` that takes `values[k]` at `k = 0, 1, 2, ..` (Newton's divided differences).
+    pub(crate) fn through(values: &[BigRational]) -> Self {
+        let mut differences = values.to_vec();
+        for level in 1..values.len() {
+            for k in (level..values.len()).rev() {
+                differences[k] = (&differences[k] - &differences[k - 1]) / BigRational::from_integer(level.into());
+            }
+        }
+        // Horner on the Newton form: p = d_n; p = p (x - k) + d_k.
+        let mut coefficients: Vec<BigRational> = Vec::new();
+        for (k, difference) in differences.iter().enumerate().rev() {
+            let node = BigRational::from_integer(k.into());
+            let mut next = vec![BigRational::zero(); coefficients.len() + 1];
+            for (power, coefficient) in coefficients.iter().enumerate() {
+                next[power + 1] += coefficient;
+                next[power] -= coefficient * &node;
+            }
+            next[0] += difference;
+            coefficients = next;
+        }
+        Self::new(coefficients)
+    }
+
+    pub(crate) fn at(&self, x: &BigRational) -> BigRational {
+        self.0.iter().rev().fold(BigRational::zero(), |sum, c| sum * x + c)
+    }
+
+    fn derivative(&self) -> Self {
+        Self::new(self.0.iter().enumerate().skip(1).map(|(k, c)| c * BigRational::from_integer(k.into())).collect())
+    }
+
+    /// Minus the remainder of `self / divisor`, scaled by a positive number to keep the digits few.
+    fn negative_remainder(&self, divisor: &Self) -> Self {
+        let mut rest = self.0.clone();
+        let Some(lead) = divisor.0.last() else { return Self(Vec::new()) };
+        while rest.len() >= divisor.0.len() {
+            let Some(top) = rest.last() else { break };
+            let factor = top / lead;
+            let shift = rest.len() - divisor.0.len();
+            for (k, c) in divisor.0.iter().enumerate() {
+                rest[shift + k] -= &factor * c;
+            }
+            rest.pop();
+        }
+        let mut negative = Self::new(rest.into_iter().map(|c| -c).collect());
+        if let Some(scale) = negative.0.last().map(Signed::abs) {
+            for c in &mut negative.0 {
+                *c = &*c / &scale;
+            }
+        }
+        negative
+    }
+
+    /// Whether the polynomial has no real root in the closed interval `[lower, upper]`, `lower <= upper`.
+    ///
+    /// Exact, by Sturm's theorem, which counts the distinct roots in `(lower, upper]` when neither end is a root. The zero
+    /// polynomial has roots everywhere.
+    pub(crate) fn has_no_root_in(&self, lower: &BigRational, upper: &BigRational) -> bool {
+        if self.0.is_empty() || self.at(lower).is_zero() || self.at(upper).is_zero() {
+            return false;
+        }
+        let mut chain = vec![self.clone(), self.derivative()];
+        while let [.., before, last] = &chain[..] {
+            if last.0.is_empty() {
+                break;
+            }
+            let next = before.negative_remainder(last);
+            chain.push(next);
+        }
+        let changes = |x: &BigRational| {
+            let signs: Vec<bool> =
+                chain.iter().map(|p| p.at(x)).filter(|v| !v.is_zero()).map(|v| v.is_positive()).collect();
+            signs.windows(2).filter(|pair| pair[0] != pair[1]).count()
+        };
+        changes(lower) == changes(upper)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::number::ratio;
+    use proptest::prelude::*;
+
+    fn rationals(values: &[i64]) -> Vec<BigRational> {
+        values.iter().map(|&v| ratio(v, 1)).collect()
+    }
+
+    fn matrix(rows: &[&[i64]]) -> Matrix {
+        rows.iter().map(|row| rationals(row)).collect()
+    }
+
+    /// Coefficients from the highest power down of the product of `(s - root)`.
+    fn with_roots(roots: &[BigRational]) -> Vec<BigRational> {
+        let mut p = vec![BigRational::one()];
+        for root in roots {
+            let mut next = p.clone();
+            next.push(BigRational::zero());
+            for (k, c) in p.iter().enumerate() {
+                next[k + 1] -= c * root;
+            }
+            p = next;
+        }
+        p
+    }
+
+    #[test]
+    fn definiteness_of_textbook_matrices() {
+        assert!(positive_definite_pivots(&matrix(&[&[2, 1], &[1, 2]])).is_some());
+        assert!(positive_definite_pivots(&matrix(&[&[1, 1], &[1, 1]])).is_none(), "singular");
+        assert!(positive_definite_pivots(&matrix(&[&[1, 2], &[2, 1]])).is_none(), "indefinite");
+        assert!(positive_definite_pivots(&matrix(&[&[1, 1], &[0, 1]])).is_none(), "not symmetric");
+        assert!(positive_definite_pivots(&Vec::new()).is_none(), "empty");
+    }
+
+    #[test]
+    fn the_characteristic_polynomial_of_a_companion_matrix_is_its_last_row() {
+        let a = matrix(&[&[0, 1, 0], &[0, 0, 1], &[-6, -11, -6]]);
+        assert_eq!(characteristic_polynomial(&a), rationals(&[1, 6, 11, 6]));
+    }
+
+    #[test]
+    fn hurwitz_knows_the_routh_boundary() {
+        // s^3 + s^2 + k s + 1 is stable exactly for k > 1.
+        assert!(is_hurwitz(&[ratio(1, 1), ratio(1, 1), ratio(1001, 1000), ratio(1, 1)]));
+        assert!(!is_hurwitz(&rationals(&[1, 1, 1, 1])));
+        assert!(!is_hurwitz(&rationals(&[1])), "vacuous");
+        assert!(!is_hurwitz(&rationals(&[-1, -1])), "negative leading coefficient");
+        assert!(!is_hurwitz(&rationals(&[1, 1, 0])), "root at zero");
+    }
+
+    #[test]
+    fn sturm_sees_double_roots_and_roots_at_the_ends() {
+        let double = Polynomial::new(rationals(&[1, -2, 1])); // (x - 1)^2
+        assert!(!double.has_no_root_in(&ratio(0, 1), &ratio(2, 1)));
+        assert!(double.has_no_root_in(&ratio(0, 1), &ratio(9, 10)));
+        assert!(!double.has_no_root_in(&ratio(0, 1), &ratio(1, 1)));
+        assert!(Polynomial::new(rationals(&[3])).has_no_root_in(&ratio(0, 1), &ratio(1, 1)));
+        assert!(!Polynomial::new(Vec::new()).has_no_root_in(&ratio(0, 1), &ratio(1, 1)));
+    }
+
+    proptest! {
+        #[test]
+        fn pivots_exist_exactly_for_gram_matrices_of_full_rank(entries in prop::collection::vec(-9_i64..9, 16), shift in 0_i64..2) {
+            // G = X'X + shift I is positive definite iff shift > 0 or X has full rank; compare with the leading minors.
+            let mut g = zeros(4);
+            for i in 0..4 { for j in 0..4 { for k in 0..4 {
+                g[i][j] += ratio(entries[4 * k + i] * entries[4 * k + j], 1);
+            }} g[i][i] += ratio(shift, 1); }
+            let minors_positive = (1..=4).all(|n| {
+                determinant(g[..n].iter().map(|row| row[..n].to_vec()).collect()).is_positive()
+            });
+            prop_assert_eq!(positive_definite_pivots(&g).is_some(), minors_positive);
+        }
+
+        #[test]
+        fn hurwitz_agrees_with_chosen_roots(real in prop::collection::vec(-30_i64..10, 1..5), pair in (-30_i64..10, 1_i64..40)) {
+            let mut p = with_roots(&real.iter().map(|&r| ratio(r, 10)).collect::<Vec<_>>());
+            // Times s^2 - 2 x s + x^2 + y^2: the pair x +- i y.
+            let (x, y) = (ratio(pair.0, 10), ratio(pair.1, 10));
+            let quadratic = [BigRational::one(), ratio(-2, 1) * &x, &x * &x + &y * &y];
+            let mut product = vec![BigRational::zero(); p.len() + 2];
+            for (i, c) in p.iter().enumerate() { for (j, d) in quadratic.iter().enumerate() { product[i + j] += c * d; } }
+            p = product;
+            prop_assert_eq!(is_hurwitz(&p), real.iter().all(|&r| r < 0) && pair.0 < 0);
+        }
+
+        #[test]
+        fn sturm_agrees_with_chosen_roots(roots in prop::collection::vec(-20_i64..20, 1..6), interval in (-20_i64..20, 0_i64..15)) {
+            let mut down = with_roots(&roots.iter().map(|&r| ratio(r, 4)).collect::<Vec<_>>());
+            down.reverse();
+            let p = Polynomial::new(down);
+            let (lower, upper) = (ratio(interval.0, 4), ratio(interval.0 + interval.1, 4));
+            let free = !roots.iter().any(|&r| (interval.0..=interval.0 + interval.1).contains(&r));
+            prop_assert_eq!(p.has_no_root_in(&lower, &upper), free);
+        }
+
+        #[test]
+        fn interpolation_returns_the_polynomial(coefficients in prop::collection::vec(-9_i64..9, 1..7)) {
+            let p = Polynomial::new(rationals(&coefficients));
+            let values: Vec<_> = (0..7).map(|k| p.at(&ratio(k, 1))).collect();
+            prop_assert_eq!(Polynomial::through(&values), p);
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! How a document is sealed, and how it is checked.
+
+use num_rational::BigRational;
+use num_traits::{Signed, Zero};
+use sha2::{Digest, Sha256};
+
+use crate::aic::SharedGains;
+use crate::document::{Claim, Document, Evidence, Family, Grade, RegionClaim};
+use crate::error::{Rejection, VerifyError};
+use crate::exponential::{LoopBox, decays, is_stable_at};
+use crate::number::{Number, positive, unit_interval};
+use crate::region::{ArmConstants, Inequality, Witness, inequalities};
+use crate::statement::{Assumption, assumptions, statement};
+
+const SCHEMA: u32 = 1;
+
+/// What became of one entry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The claim holds, with its grade.
+    Holds,
+    /// The claim is refused and the counterexample stands.
+    Refused,
+    /// The entry itself says that nothing was proved.
+    NotProved,
+}
+
+/// A checked entry.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Checked {
+    /// `exponential` or `region`.
+    pub kind: &'static str,
+    /// What became of it.
+    pub verdict: Verdict,
+    /// How strong it is; `None` unless it holds.
+    pub grade: Option<Grade>,
+    /// In words, as derived from the numbers.
+    pub statement: String,
+    /// The matrix inequalities that were checked.
+    pub inequalities: Vec<Inequality>,
+}
+
+/// A document whose every entry was checked by this crate. Only [`verify`] makes one.
+#[derive(Clone, Debug)]
+pub struct Certificate {
+    document: Document,
+    checked: Vec<Checked>,
+}
+
+impl Certificate {
+    /// The document that was checked.
+    pub fn document(&self) -> &Document {
+        &self.document
+    }
+
+    /// Every entry with its verdict, in the document's order.
+    pub fn checked(&self) -> &[Checked] {
+        &self.checked
+    }
+
+    /// Whether every entry is a claim that holds (a conditional one included).
+    pub fn all_hold(&self) -> bool {
+        self.checked.iter().all(|entry| entry.verdict == Verdict::Holds)
+    }
+
+    /// What the claims take for granted.
+    pub fn assumptions(&self) -> Vec<Assumption> {
+        assumptions(&self.document)
+    }
+}
+
+/// What a claim may be graded when it rests on this evidence.
+pub(crate) fn allowed_grade(evidence: &Evidence) -> (Grade, &'static str) {
+    match evidence {
+        Evidence::Sampled { .. } => (Grade::Conditional, "sampled"),
+    }
+}
+
+/// Completes a document: derives the statement and grade of each claim, the schema, and the hash.
+#[must_use]
+pub fn seal(mut document: Document) -> Document {
+    document.schema = SCHEMA;
+    let statements: Vec<String> = document.claims.iter().map(|claim| statement(&document, claim)).collect();
+    let (allowed, _) = allowed_grade(&document.constants.evidence);
+    for (claim, derived) in document.claims.iter_mut().zip(statements) {
+        match claim {
+            Claim::Exponential(c) => (c.statement, c.grade) = (derived, allowed),
+            Claim::Region(c) => (c.statement, c.grade) = (derived, allowed),
+            Claim::Refused(c) => c.statement = derived,
+            Claim::NotProved(c) => c.statement = derived,
+        }
+    }
+    document.sha256 = hash(&document);
+    document
+}
+
+fn hash(document: &Document) -> String {
+    let unsealed = Document { sha256: String::new(), ..document.clone() };
+    // Plain structs of texts and integers always serialise; an empty digest would still be compared with the file's.
+    let canonical = serde_json::to_vec(&unsealed).unwrap_or_default();
+    Sha256::digest(&canonical).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Reads a certificate and checks every entry of it.
+///
+/// The outer error says that the text is no certificate; the inner result holds either the checked certificate or the first
+/// reason to reject it. An entry that records a refusal is checked too: its counterexample must stand.
+///
+/// # Errors
+/// [`VerifyError`] when the text cannot be read.
+pub fn verify(text: &str) -> Result<Result<Certificate, Rejection>, VerifyError> {
+    #[derive(serde::Deserialize)]
+    struct Head {
+        schema: u32,
+    }
+    let head: Head = serde_json::from_str(text)?;
+    if head.schema != SCHEMA {
+        return Err(VerifyError::Schema { found: head.schema, expected: SCHEMA });
+    }
+    let document: Document = serde_json::from_str(text)?;
+    Ok(check(document))
+}
+
+fn check(document: Document) -> Result<Certificate, Rejection> {
+    let computed = hash(&document);
+    if computed != document.sha256 {
+        return Err(Rejection::Hash { computed, written: document.sha256 });
+    }
+    if document.claims.is_empty() {
+        return Err(Rejection::Empty);
+    }
+    check_quantities(&document)?;
+    let checked = document
+        .claims
+        .iter()
+        .enumerate()
+        .map(|(position, claim)| check_claim(&document, position + 1, claim))
+        .collect::<Result<_, _>>()?;
+    Ok(Certificate { document, checked })
+}
+
+fn require(quantity: &'static str, number: &Number, holds: bool, expected: &'static str) -> Result<(), Rejection> {
+    if holds { Ok(()) } else { Err(Rejection::Quantity { quantity, value: number.to_string(), expected }) }
+}
+
+fn require_interval(quantity: &'static str, [lower, upper]: &[Number; 2]) -> Result<(), Rejection> {
+    require(quantity, lower, !lower.value().is_negative(), "a least value of at least 0")?;
+    require(quantity, upper, lower.value() <= upper.value(), "a largest value no smaller than the least")
+}
+
+/// What every claim needs: gains and family that exist, constants of a family that is not empty.
+fn check_quantities(document: &Document) -> Result<(), Rejection> {
+    let Document { arm, gains, family, constants, .. } = document;
+    if arm.joints == 0 {
+        return Err(Rejection::Length { quantity: "joints", found: 0, expected: 1 });
+    }
+    // The name stands in the statement: it must not be able to say anything.
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
+    if arm.name.is_empty() || arm.name.len() > 64 || !arm.name.chars().all(plain) {
+        let value = arm.name.chars().take(64).collect();
+        return Err(Rejection::Quantity {
+            quantity: "arm name",
+            value,
+            expected: "letters, digits, - _ . (at most 64)",
+        });
+    }
+    for (gain, list) in gains.named() {
+        if list.len() != arm.joints {
+            return Err(Rejection::Length { quantity: gain, found: list.len(), expected: arm.joints });
+        }
+        for number in list {
+            require(gain, number, positive(number.value()), "a positive number")?;
+        }
+    }
+    let Family { friction_n_m_s_per_rad, mass_uncertainty, payload_kg, rotor_inertia_kg_m2, .. } = family;
+    require_interval("friction_n_m_s_per_rad", friction_n_m_s_per_rad)?;
+    require_interval("payload_kg", payload_kg)?;
+    require_interval("rotor_inertia_kg_m2", rotor_inertia_kg_m2)?;
+    let share = mass_uncertainty.value();
+    let one = BigRational::from_integer(1.into());
+    require("mass_uncertainty", mass_uncertainty, !share.is_negative() && *share < one, "a share in [0, 1)")?;
+    require("m_lo_kg_m2", &constants.m_lo_kg_m2, positive(constants.m_lo_kg_m2.value()), "a positive number")?;
+    let ordered = constants.m_lo_kg_m2.value() <= constants.m_hi_kg_m2.value();
+    require("m_hi_kg_m2", &constants.m_hi_kg_m2, ordered, "a number no smaller than m_lo_kg_m2")?;
+    for (name, number) in
+        [("k_g_n_m_per_rad", &constants.k_g_n_m_per_rad), ("k_c_kg_m2", &constants.k_c_kg_m2), ("k_r", &constants.k_r)]
+    {
+        require(name, number, !number.value().is_negative(), "a number of at least 0")?;
+    }
+    let Evidence::Sampled { margin, .. } = &constants.evidence;
+    require("margin", margin, !margin.value().is_negative(), "a share of at least 0")
+}
+
+/// The box of linearised loops that the family's constants span.
+pub fn family_box(document: &Document) -> LoopBox {
+    let Document { family, constants, .. } = document;
+    let stiffness = if family.gravity_compensation { Number::zero() } else { constants.k_g_n_m_per_rad.clone() };
+    LoopBox {
+        inertia: [constants.m_lo_kg_m2.clone(), constants.m_hi_kg_m2.clone()],
+        friction: family.friction_n_m_s_per_rad.clone(),
+        stiffness: [stiffness.negated(), stiffness],
+    }
+}
+
+/// Gravity stiffness that acts on the loop: none where the robot compensates gravity.
+fn stiffness(document: &Document) -> BigRational {
+    if document.family.gravity_compensation {
+        BigRational::zero()
+    } else {
+        document.constants.k_g_n_m_per_rad.value().clone()
+    }
+}
+
+pub(crate) fn region_parts(
+    document: &Document,
+    claim: &RegionClaim,
+) -> Result<(SharedGains, ArmConstants, Witness), Rejection> {
+    let gains = document.gains.shared(document.arm.joints)?;
+    let constants = &document.constants;
+    let arm = ArmConstants {
+        inertia: [constants.m_lo_kg_m2.value().clone(), constants.m_hi_kg_m2.value().clone()],
+        friction: document.family.friction_n_m_s_per_rad.clone().map(|x| x.value().clone()),
+        stiffness: stiffness(document),
+        coriolis: constants.k_c_kg_m2.value().clone(),
+        coriolis_relative: constants.k_r.value().clone(),
+    };
+    let witness = &claim.witness;
+    require("radius_rad", &claim.radius_rad, positive(claim.radius_rad.value()), "a positive number")?;
+    require("rate_per_s", &claim.rate_per_s, positive(claim.rate_per_s.value()), "a positive number")?;
+    require("p", &witness.p, positive(witness.p.value()), "a positive number")?;
+    require("rho", &witness.rho, positive(witness.rho.value()), "a positive number")?;
+    require("theta", &witness.theta, unit_interval(witness.theta.value()), "a share in [0, 1]")?;
+    for (name, multiplier) in [
+        ("friction_multiplier", &witness.friction_multiplier),
+        ("gravity_multiplier", &witness.gravity_multiplier),
+        ("start_multiplier", &witness.start_multiplier),
+    ] {
+        require(name, multiplier, !multiplier.value().is_negative(), "a number of at least 0")?;
+    }
+    if witness.s.len() != 15 {
+        return Err(Rejection::Length { quantity: "s", found: witness.s.len(), expected: 15 });
+    }
+    let mut s = crate::algebra::zeros(5);
+    let mut entries = witness.s.iter();
+    for (i, j) in (0..5).flat_map(|i| (i..5).map(move |j| (i, j))) {
+        if let Some(entry) = entries.next() {
+            s[i][j].clone_from(entry.value());
+            s[j][i].clone_from(entry.value());
+        }
+    }
+    let witness = Witness {
+        p: witness.p.value().clone(),
+        b: witness.b.clone().map(|x| x.value().clone()),
+        s,
+        rho: witness.rho.value().clone(),
+        theta: witness.theta.value().clone(),
+        friction_multiplier: witness.friction_multiplier.value().clone(),
+        gravity_multiplier: witness.gravity_multiplier.value().clone(),
+        start_multiplier: witness.start_multiplier.value().clone(),
+        rate: claim.rate_per_s.value().clone(),
+        radius: claim.radius_rad.value().clone(),
+    };
+    Ok((gains, arm, witness))
+}
+
+fn check_claim(document: &Document, index: usize, claim: &Claim) -> Result<Checked, Rejection> {
+    let derived = statement(document, claim);
+    let (written, graded) = match claim {
+        Claim::Exponential(c) => (&c.statement, Some(c.grade)),
+        Claim::Region(c) => (&c.statement, Some(c.grade)),
+        Claim::Refused(c) => (&c.statement, None),
+        Claim::NotProved(c) => (&c.statement, None),
+    };
+    if *written != derived {
+        return Err(Rejection::Statement { index, derived });
+    }
+    let (grade, allowed) = allowed_grade(&document.constants.evidence);
+    if graded.is_some_and(|written| written != grade) {
+        return Err(Rejection::Grade { index, allowed });
+    }
+    let mut checked = Checked {
+        kind: "exponential",
+        verdict: Verdict::Holds,
+        grade: graded,
+        statement: derived,
+        inequalities: Vec::new(),
+    };
+    match claim {
+        Claim::Exponential(c) => {
+            let gains = document.gains.shared(document.arm.joints)?;
+            require("rate_per_s", &c.rate_per_s, positive(c.rate_per_s.value()), "a positive number")?;
+            decays(&gains, &family_box(document), c.rate_per_s.value())
+                .map_err(|reason| Rejection::Polynomial { index, reason })?;
+        }
+        Claim::Region(c) => {
+            let (gains, arm, witness) = region_parts(document, c)?;
+            checked.kind = "region";
+            checked.inequalities = inequalities(&gains, &arm, &witness);
+            if let Some(failed) = checked.inequalities.iter().find(|x| x.smallest_pivot.is_none()) {
+                return Err(Rejection::Inequality { index, inequality: failed.name.clone() });
+            }
+        }
+        Claim::Refused(c) => {
+            let [m, d, g] = [&c.point.inertia_kg_m2, &c.point.friction_n_m_s_per_rad, &c.point.stiffness_n_m_per_rad]
+                .map(Number::value);
+            require("rate_per_s", &c.rate_per_s, !c.rate_per_s.value().is_negative(), "a number of at least 0")?;
+            document.gains.shared(document.arm.joints)?;
+            if !family_box(document).contains([m, d, g]) {
+                return Err(Rejection::Counterexample { index, reason: "the point lies outside the family's box" });
+            }
+            if is_stable_at(&document.gains, [m, d, g], c.rate_per_s.value()) {
+                return Err(Rejection::Counterexample { index, reason: "the loop at the point decays at the rate" });
+            }
+            checked.verdict = Verdict::Refused;
+        }
+        Claim::NotProved(c) => {
+            checked.verdict = Verdict::NotProved;
+            checked.kind = c.of.kind();
+        }
+    }
+    Ok(checked)
+}

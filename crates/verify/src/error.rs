@@ -1,0 +1,99 @@
+//! Why a certificate is unreadable, and why a readable one is rejected.
+
+/// The text is no certificate at all.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// Not JSON of the certificate's shape: truncated, a field missing, unknown or of the wrong type.
+    #[error("not a certificate: {0}")]
+    Unreadable(#[from] serde_json::Error),
+    /// Written by another version of the format.
+    #[error("certificate schema {found}, this version reads schema {expected}")]
+    Schema {
+        /// The schema named in the file.
+        found: u32,
+        /// The schema this crate reads.
+        expected: u32,
+    },
+}
+
+/// A readable certificate that proves less than it says.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Rejection {
+    /// The content does not have the hash written beside it.
+    #[error("the content hashes to {computed}, the file says {written}: it was edited after it was sealed")]
+    Hash {
+        /// SHA-256 of the canonical content.
+        computed: String,
+        /// The hash in the file.
+        written: String,
+    },
+    /// A document without claims proves nothing.
+    #[error("the document holds no claim")]
+    Empty,
+    /// A quantity is outside what the claim's proof allows.
+    #[error("{quantity} is {value}, expected {expected}")]
+    Quantity {
+        /// Name of the quantity, as in the file.
+        quantity: &'static str,
+        /// As written.
+        value: String,
+        /// What the proof needs.
+        expected: &'static str,
+    },
+    /// Lists of gains differ in length from the arm.
+    #[error("{quantity} has {found} entries, the arm has {expected} joints")]
+    Length {
+        /// Name of the list.
+        quantity: &'static str,
+        /// Entries in the file.
+        found: usize,
+        /// Joints of the arm.
+        expected: usize,
+    },
+    /// The claim's proof needs the same gains on every joint.
+    #[error("{gain} differs between joints: this claim is proved only for equal gains on every joint")]
+    UnequalGains {
+        /// The gain that differs.
+        gain: &'static str,
+    },
+    /// The words are not those of the numbers.
+    #[error("claim {index}: the statement is not the one its numbers make; they say: {derived}")]
+    Statement {
+        /// Position of the claim, from 1.
+        index: usize,
+        /// The statement derived from the numbers.
+        derived: String,
+    },
+    /// The grade is not the one the evidence allows.
+    #[error("claim {index}: the grade is not the one that {allowed} evidence allows")]
+    Grade {
+        /// Position of the claim, from 1.
+        index: usize,
+        /// What the constants rest on.
+        allowed: &'static str,
+    },
+    /// A matrix inequality of the proof is false.
+    #[error("claim {index}: the inequality `{inequality}` does not hold")]
+    Inequality {
+        /// Position of the claim, from 1.
+        index: usize,
+        /// Name of the inequality.
+        inequality: String,
+    },
+    /// The polynomial family is not shown stable.
+    #[error("claim {index}: {reason}")]
+    Polynomial {
+        /// Position of the claim, from 1.
+        index: usize,
+        /// Where the proof stops.
+        reason: String,
+    },
+    /// A refusal whose counterexample is none.
+    #[error("claim {index}: the counterexample is no counterexample: {reason}")]
+    Counterexample {
+        /// Position of the claim, from 1.
+        index: usize,
+        /// Why.
+        reason: &'static str,
+    },
+}

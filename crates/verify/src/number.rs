@@ -1,0 +1,207 @@
+//! Numbers as they are written in a certificate, and the rationals they are.
+//!
+//! Two spellings: a decimal as a person writes it (`11.67`, `-2.5e-3`), and a dyadic `mantissa p exponent` meaning
+//! `mantissa * 2^exponent` (`-4503599627370497p-52`), which is what a floating-point number is exactly. Lengths and exponents are
+//! bounded so that a hostile file cannot ask for a number that fills the memory.
+
+use core::fmt;
+use core::str::FromStr;
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, Pow, ToPrimitive, Zero};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+const MAX_CHARS: usize = 400;
+const MAX_EXPONENT: i32 = 1200;
+
+/// Why a text is no number of a certificate.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{text}` is no exact number: expected a decimal such as 11.67 or a dyadic such as -3p-4")]
+pub struct NumberError {
+    /// The text, shortened when it is long.
+    pub text: String,
+}
+
+/// An exact rational number that remembers how it was written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Number {
+    text: String,
+    value: BigRational,
+}
+
+impl Number {
+    /// The shortest decimal that reads back as `x`, taken as exact. `None` unless `x` is finite.
+    ///
+    /// For a number a person wrote with at most 15 digits this is the number they wrote.
+    pub fn decimal(x: f64) -> Option<Self> {
+        x.is_finite().then(|| format!("{x}").parse().ok()).flatten()
+    }
+
+    /// `x` itself, as a dyadic rational. `None` unless `x` is finite.
+    pub fn dyadic(x: f64) -> Option<Self> {
+        let exact = BigRational::from_float(x)?;
+        let power = exact.denom().bits() as i64 - 1;
+        format!("{}p-{power}", exact.numer()).parse().ok()
+    }
+
+    /// 0.
+    pub fn zero() -> Self {
+        Self { text: "0".to_owned(), value: BigRational::zero() }
+    }
+
+    /// The number with the other sign.
+    pub(crate) fn negated(&self) -> Self {
+        let text = match self.text.strip_prefix('-') {
+            Some(positive) => positive.to_owned(),
+            None => format!("-{}", self.text),
+        };
+        Self { text, value: -self.value.clone() }
+    }
+
+    /// The value.
+    pub fn value(&self) -> &BigRational {
+        &self.value
+    }
+
+    /// The nearest `f64`, for printing and plotting only.
+    pub fn to_f64(&self) -> f64 {
+        self.value.to_f64().unwrap_or(f64::NAN)
+    }
+}
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// Digits with an optional leading minus; no plus, no blanks, no empty text.
+fn integer(text: &str) -> Option<BigInt> {
+    let digits = text.strip_prefix('-').unwrap_or(text);
+    if digits.is_empty() || !digits.bytes().all(|c| c.is_ascii_digit()) {
+        return None;
+    }
+    text.parse().ok()
+}
+
+fn exponent(text: &str) -> Option<i32> {
+    let e = integer(text.strip_prefix('+').unwrap_or(text))?.to_i32()?;
+    (e.abs() <= MAX_EXPONENT).then_some(e)
+}
+
+fn scaled(mantissa: BigInt, base: u32, exponent: i32) -> BigRational {
+    let power = Pow::pow(BigInt::from(base), exponent.unsigned_abs());
+    if exponent >= 0 { BigRational::from_integer(mantissa * power) } else { BigRational::new(mantissa, power) }
+}
+
+fn parse(text: &str) -> Option<BigRational> {
+    if text.len() > MAX_CHARS {
+        return None;
+    }
+    if let Some((mantissa, power)) = text.split_once('p') {
+        return Some(scaled(integer(mantissa)?, 2, exponent(power)?));
+    }
+    let (mantissa, power) = match text.split_once(['e', 'E']) {
+        Some((mantissa, power)) => (mantissa, exponent(power)?),
+        None => (text, 0),
+    };
+    let Some((whole, fraction)) = mantissa.split_once('.') else {
+        return Some(scaled(integer(mantissa)?, 10, power));
+    };
+    if fraction.is_empty() || !fraction.bytes().all(|c| c.is_ascii_digit()) {
+        return None;
+    }
+    let digits = integer(&format!("{whole}{fraction}"))?;
+    integer(whole)?;
+    Some(scaled(digits, 10, power.checked_sub(i32::try_from(fraction.len()).ok()?)?))
+}
+
+impl FromStr for Number {
+    type Err = NumberError;
+
+    fn from_str(text: &str) -> Result<Self, NumberError> {
+        match parse(text) {
+            Some(value) => Ok(Self { text: text.to_owned(), value }),
+            None => Err(NumberError { text: text.chars().take(40).collect() }),
+        }
+    }
+}
+
+impl Serialize for Number {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(&self.text)
+    }
+}
+
+impl<'de> Deserialize<'de> for Number {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(serde::de::Error::custom)
+    }
+}
+
+/// The rational `numerator / denominator` of two small integers.
+pub(crate) fn ratio(numerator: i64, denominator: i64) -> BigRational {
+    BigRational::new(numerator.into(), denominator.into())
+}
+
+/// `0 < x`, spelled for rationals.
+pub(crate) fn positive(x: &BigRational) -> bool {
+    x > &BigRational::zero()
+}
+
+/// `x` in `[0, 1]`.
+pub(crate) fn unit_interval(x: &BigRational) -> bool {
+    *x >= BigRational::zero() && *x <= BigRational::one()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn value(text: &str) -> BigRational {
+        text.parse::<Number>().unwrap().value().clone()
+    }
+
+    #[test]
+    fn decimals_are_exact() {
+        assert_eq!(value("0.1"), ratio(1, 10));
+        assert_eq!(value("-2.50e-1"), ratio(-1, 4));
+        assert_eq!(value("-0.5"), ratio(-1, 2));
+        assert_eq!(value("11.67"), ratio(1167, 100));
+        assert_eq!(value("3e2"), ratio(300, 1));
+        assert_eq!(value("-3p-4"), ratio(-3, 16));
+    }
+
+    #[test]
+    fn what_is_no_number_is_refused() {
+        let long = "1".repeat(500);
+        for text in [
+            "", "-", ".5", "5.", "1e", "1e99999", "0x1", "NaN", "inf", "1 ", "+1", "1p", "--1", "1.-5", "1.5p3",
+            "1e2e3", &long,
+        ] {
+            assert!(text.parse::<Number>().is_err(), "{text}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_dyadic_is_the_float_itself(x in any::<f64>().prop_filter("finite", |x| x.is_finite())) {
+            // Below 2^-1200 + 52 the exponent bound of the format bites; such numbers are of no use in a proof.
+            prop_assume!(x == 0.0 || x.abs() > 1e-300);
+            let n = Number::dyadic(x).unwrap();
+            prop_assert_eq!(n.value().clone(), BigRational::from_float(x).unwrap());
+        }
+
+        #[test]
+        fn the_shortest_decimal_reads_back(x in -1e9..1e9_f64) {
+            prop_assert_eq!(Number::decimal(x).unwrap().to_f64().to_bits(), x.to_bits());
+        }
+
+        #[test]
+        fn no_text_panics(text in ".{0,40}") {
+            let _ = text.parse::<Number>();
+        }
+    }
+}
