@@ -1,1 +1,26 @@
 //! Search space, score and derivative-free search.
+//!
+//! A [`Space`] says which gains may move, an [`Objective`] turns gains into a ranked [`Outcome`], [`search()`] spends an exact number of
+//! evaluations on finding good ones, and [`tune()`] brings the best before a certifier and held-out plants before the winner. The record is the same to
+//! the bit for any number of threads.
+#![forbid(unsafe_code)]
+
+pub mod batch;
+pub mod filter;
+mod gains;
+pub mod outcome;
+pub mod record;
+pub mod score;
+pub mod search;
+pub mod space;
+pub mod streams;
+pub mod tune;
+
+pub use batch::{AicObjective, Batch, BatchError};
+pub use filter::StabilityFilter;
+pub use gains::{Gain, Gains, NotShared};
+pub use outcome::{Finite, NotFinite, Outcome};
+pub use record::{Attempt, Figures, HeldOut, PlantResult, Question, RunRecord, Sensitivity, Verdict};
+pub use search::{Evaluation, Objective, Phase, Progress, SearchError, SearchRun, SearchSettings, Termination, search};
+pub use space::{Freedom, Method, Range, Scale, Space, SpaceError};
+pub use tune::{Bench, Judge, Stage, TuneError, TuneProgress, Tuned, tune};

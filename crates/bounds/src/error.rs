@@ -1,0 +1,72 @@
+//! What can be wrong with a box or with the options of a search.
+
+use thiserror::Error;
+
+/// A range or an option that describes nothing, with the number that says so.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum BoundsError {
+    /// The relative uncertainty of the link masses is outside `[0, 1)`: at 1 a link could be massless.
+    #[error("mass uncertainty is {value}, expected 0 <= uncertainty < 1 (0.2 means +-20 %)")]
+    MassUncertainty {
+        /// The fraction given.
+        value: f64,
+    },
+    /// An interval of masses that is not `0 <= lower <= upper < infinity`.
+    #[error("payload is {lower} to {upper} kg, expected 0 <= lower <= upper, both finite")]
+    Payload {
+        /// Lower end, kg.
+        lower: f64,
+        /// Upper end, kg.
+        upper: f64,
+    },
+    /// A coordinate of the payload's centre of mass that is not finite.
+    #[error("payload position has coordinate {axis} = {value} m, expected a finite number")]
+    PayloadPosition {
+        /// 0, 1, 2 for x, y, z.
+        axis: usize,
+        /// The coordinate, m.
+        value: f64,
+    },
+    /// An interval of rotor inertias that is not `0 <= lower <= upper < infinity`.
+    #[error("rotor inertia of joint {joint} is {lower} to {upper} kg m^2, expected 0 <= lower <= upper, both finite")]
+    RotorInertia {
+        /// Joint, counted from 1 at the base.
+        joint: usize,
+        /// Lower end, kg m².
+        lower: f64,
+        /// Upper end, kg m².
+        upper: f64,
+    },
+    /// The margin is negative, infinite or not a number.
+    #[error("margin is {value}, expected a finite number >= 0 (0.05 means 5 %)")]
+    Margin {
+        /// The fraction given.
+        value: f64,
+    },
+    /// A search without a single sample.
+    #[error("samples is 0, expected at least 1")]
+    Samples,
+    /// A list of scales or coordinates that does not match the box.
+    #[error("{given} numbers given, the box has {expected}")]
+    Length {
+        /// Numbers given.
+        given: usize,
+        /// Numbers expected.
+        expected: usize,
+    },
+    /// An axis of a search that is not a finite, ordered interval.
+    #[error("search axis {axis} is {lower} to {upper}, expected lower <= upper, both finite")]
+    Axis {
+        /// Its index, from 0.
+        axis: usize,
+        /// Lower end.
+        lower: f64,
+        /// Upper end.
+        upper: f64,
+    },
+}
+
+/// True for `0 <= lower <= upper < infinity`; NaN fails.
+pub(crate) fn is_range(range: [f64; 2]) -> bool {
+    range[0] >= 0.0 && range[0] <= range[1] && range[1].is_finite()
+}

@@ -1,0 +1,250 @@
+//! What a run was worth: figures per goal and joint, accumulated sample by sample without storing the run.
+//!
+//! With `e(t) = q(t) - goal`, t from the moment the goal is set, `s` the commanded step (goal less the goal before it; for the
+//! first, less the start) and h the sampling step:
+//!
+//! | figure | code | definition | unit |
+//! |--------|------|------------|------|
+//! | final error | `final_error_rad` | e at the segment's end, signed | rad |
+//! | settling | `settling_time_s` | end of the last sample with `\|e\| > 0.02 \|s\|`; none if that is the segment's last | s |
+//! | overshoot | `overshoot` | largest `sign(s) e / \|s\|`, at least 0: a fraction of the step | 1 |
+//! | peak torque | `peak_torque_n_m` | largest `\|tau\|` asked of the motor, before its limit | N m |
+//! | saturation | `saturated_steps` | samples in which that exceeds the motor's limit | 1 |
+//! | jitter | `torque_rate_rms_n_m_per_s` | root mean square of `(tau_k - tau_{k-1})/h`, of the torque the motor gives | N m/s |
+//! | ITAE | `itae_rad_s2` | `sum h t \|e\|` | rad s² |
+//!
+//! The torque asked of the motor is the controller's, delayed, plus the gravity compensation. Saturation is counted whether or not
+//! the limit is applied. A joint with `|s| < 1e-3 rad` has neither settling time nor overshoot. The run's first sample has no torque rate.
+//!
+//! Limits: a run that diverges ends there; its last segment is judged on the samples before, with no settling times.
+
+use certune_linsys::Joints;
+use serde::{Deserialize, Serialize};
+
+/// Fraction of the step within which a joint counts as settled.
+pub const SETTLING_BAND: f64 = 0.02;
+/// Below this a joint is not asked to move, rad.
+pub const LEAST_STEP_RAD: f64 = 1e-3;
+
+/// Figures of one goal; lists run base to tip. Definitions in [the module](self).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Segment {
+    /// When the goal is set, s.
+    pub from_s: f64,
+    /// How long it stood, s; shorter than asked for when the run diverged.
+    pub duration_s: f64,
+    /// The goal, rad.
+    pub goal_rad: Vec<f64>,
+    /// Position less goal at the end, rad.
+    pub final_error_rad: Vec<f64>,
+    /// 2 % settling time, s; none for a joint that did not settle or was not asked to move.
+    pub settling_time_s: Vec<Option<f64>>,
+    /// Overshoot as a fraction of the step; none for a joint that was not asked to move.
+    pub overshoot: Vec<Option<f64>>,
+    /// Largest torque asked of the motor, N m.
+    pub peak_torque_n_m: Vec<f64>,
+    /// Samples in which more than the motor's limit was asked for.
+    pub saturated_steps: Vec<u64>,
+    /// Root mean square of the torque's rate, N m/s.
+    pub torque_rate_rms_n_m_per_s: Vec<f64>,
+    /// Integral of time times absolute error, rad s².
+    pub itae_rad_s2: Vec<f64>,
+    /// Largest joint speed, rad/s.
+    pub peak_speed_rad_per_s: Vec<f64>,
+}
+
+/// Figures of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Metrics {
+    /// One entry per goal that was set.
+    pub segments: Vec<Segment>,
+    /// When the run diverged, s.
+    pub diverged_at_s: Option<f64>,
+}
+
+impl Segment {
+    /// The largest final error of any joint, rad.
+    pub fn worst_final_error_rad(&self) -> f64 {
+        largest(self.final_error_rad.iter().map(|error| error.abs()))
+    }
+
+    /// The longest settling time over the joints asked to move, s; none when one of them did not settle, or none was asked to move.
+    pub fn slowest_settling_time_s(&self) -> Option<f64> {
+        // Overshoot exists exactly for the joints that were asked to move.
+        let moving = self.overshoot.iter().zip(&self.settling_time_s).filter(|(moved, _)| moved.is_some());
+        moving.map(|(_, settled)| *settled).collect::<Option<Vec<_>>>()?.into_iter().reduce(f64::max)
+    }
+
+    /// The largest overshoot of any joint, as a fraction of its step; 0 when none was asked to move.
+    pub fn worst_overshoot(&self) -> f64 {
+        largest(self.overshoot.iter().flatten().copied())
+    }
+}
+
+impl Metrics {
+    /// The largest final error of any joint in any segment, rad.
+    pub fn worst_final_error_rad(&self) -> f64 {
+        largest(self.segments.iter().map(Segment::worst_final_error_rad))
+    }
+
+    /// Samples, summed over segments and joints, in which more than a motor's limit was asked for.
+    pub fn saturated_steps(&self) -> u64 {
+        self.segments.iter().flat_map(|segment| &segment.saturated_steps).sum()
+    }
+}
+
+fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, f64::max)
+}
+
+/// What one sample contributes.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Contribution<const N: usize> {
+    /// Position at the end of the sample, rad.
+    pub q: Joints<N>,
+    /// Velocity at the end of the sample, rad/s.
+    pub dq: Joints<N>,
+    /// Torque asked of the motor, N m.
+    pub asked: Joints<N>,
+    /// Torque the motor gives, N m.
+    pub given: Joints<N>,
+}
+
+/// Accumulates one segment. `Copy`, no heap.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Meter<const N: usize> {
+    from_step: u64,
+    samples: u64,
+    goal: Joints<N>,
+    commanded: Joints<N>,
+    error: Joints<N>,
+    last_outside: [u64; N],
+    overshoot: Joints<N>,
+    peak_torque: Joints<N>,
+    peak_speed: Joints<N>,
+    saturated: [u64; N],
+    rate_squares: Joints<N>,
+    rates: u64,
+    /// Sum of sample number times |e|.
+    itae: Joints<N>,
+}
+
+impl<const N: usize> Meter<N> {
+    pub fn new(from_step: u64, q: &Joints<N>, previous_goal: &Joints<N>, goal: &Joints<N>) -> Self {
+        Self {
+            from_step,
+            samples: 0,
+            goal: *goal,
+            commanded: goal - previous_goal,
+            error: q - goal,
+            last_outside: [0; N],
+            overshoot: Joints::zeros(),
+            peak_torque: Joints::zeros(),
+            peak_speed: Joints::zeros(),
+            saturated: [0; N],
+            rate_squares: Joints::zeros(),
+            rates: 0,
+            itae: Joints::zeros(),
+        }
+    }
+
+    pub fn add(&mut self, sample: &Contribution<N>, previously_given: Option<&Joints<N>>, limit: &Joints<N>) {
+        self.samples += 1;
+        self.rates += u64::from(previously_given.is_some());
+        self.error = sample.q - self.goal;
+        for joint in 0..N {
+            let (error, step) = (self.error[joint], self.commanded[joint]);
+            if !(error.abs() <= SETTLING_BAND * step.abs()) {
+                self.last_outside[joint] = self.samples;
+            }
+            self.overshoot[joint] = self.overshoot[joint].max(step.signum() * error);
+            self.peak_torque[joint] = self.peak_torque[joint].max(sample.asked[joint].abs());
+            self.peak_speed[joint] = self.peak_speed[joint].max(sample.dq[joint].abs());
+            self.saturated[joint] += u64::from(sample.asked[joint].abs() > limit[joint]);
+            self.itae[joint] += self.samples as f64 * error.abs();
+            if let Some(before) = previously_given {
+                let change = sample.given[joint] - before[joint];
+                self.rate_squares[joint] += change * change;
+            }
+        }
+    }
+
+    pub fn finish(&self, step_s: f64, diverged: bool) -> Segment {
+        let each = |value: &dyn Fn(usize) -> f64| (0..N).map(value).collect::<Vec<f64>>();
+        let moves = |joint: usize| self.commanded[joint].abs() >= LEAST_STEP_RAD;
+        let settled = |joint: usize| {
+            let inside_at_end = self.last_outside[joint] < self.samples;
+            (moves(joint) && inside_at_end && !diverged).then(|| self.last_outside[joint] as f64 * step_s)
+        };
+        Segment {
+            from_s: self.from_step as f64 * step_s,
+            duration_s: self.samples as f64 * step_s,
+            goal_rad: each(&|joint| self.goal[joint]),
+            final_error_rad: each(&|joint| self.error[joint]),
+            settling_time_s: (0..N).map(settled).collect(),
+            overshoot: (0..N)
+                .map(|joint| moves(joint).then(|| self.overshoot[joint] / self.commanded[joint].abs()))
+                .collect(),
+            peak_torque_n_m: each(&|joint| self.peak_torque[joint]),
+            saturated_steps: self.saturated.to_vec(),
+            torque_rate_rms_n_m_per_s: each(&|joint| {
+                (self.rate_squares[joint] / self.rates.max(1) as f64).sqrt() / step_s
+            }),
+            itae_rad_s2: each(&|joint| self.itae[joint] * step_s * step_s),
+            peak_speed_rad_per_s: each(&|joint| self.peak_speed[joint]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP_S: f64 = 1e-3;
+
+    /// A first-order approach `e = -s exp(-t/T)` of joint 0, a ringing joint 1, a joint 2 that is not asked to move.
+    fn measured(duration_s: f64) -> Segment {
+        let goal = Joints::<3>::new(2.0, -1.0, 0.5);
+        let start = Joints::<3>::new(1.0, 0.0, 0.5);
+        let mut meter = Meter::new(0, &start, &start, &goal);
+        let mut before: Option<Joints<3>> = None;
+        for k in 1..=(duration_s / STEP_S).round() as u64 {
+            let t = k as f64 * STEP_S;
+            let q = Joints::<3>::new(2.0 - (-t / 0.5).exp(), -1.0 + (-t / 0.5).exp() * (8.0 * t).cos(), 0.5 + 0.01 * t);
+            let given = Joints::<3>::new(30.0 * t, 5.0, -8.0 * t);
+            let sample = Contribution { q, dq: Joints::zeros(), asked: given, given };
+            meter.add(&sample, before.as_ref(), &Joints::<3>::new(60.0, 10.0, 1e9));
+            before = Some(given);
+        }
+        meter.finish(STEP_S, false)
+    }
+
+    #[test]
+    fn figures_of_known_signals() {
+        let segment = measured(3.0);
+        assert!((segment.final_error_rad[0] + (-6.0_f64).exp()).abs() < 1e-12);
+        // exp(-t/T) = 0.02 at t = T ln 50.
+        assert!((segment.settling_time_s[0].unwrap() - 0.5 * 50.0_f64.ln()).abs() < 2.0 * STEP_S);
+        assert_eq!(segment.overshoot[0], Some(0.0));
+        // The first swing past the goal, where d/dt (exp(-2t) cos 8t) = 0: tan 8t = -1/4, t = (pi - atan 0.25)/8.
+        let t = (std::f64::consts::PI - 0.25_f64.atan()) / 8.0;
+        assert!((segment.overshoot[1].unwrap() + (-2.0 * t).exp() * (8.0 * t).cos()).abs() < 1e-4);
+        assert_eq!((segment.settling_time_s[2], segment.overshoot[2]), (None, None));
+        assert!((segment.peak_torque_n_m[0] - 90.0).abs() < 1e-9);
+        assert_eq!(segment.saturated_steps, [1000, 0, 0]);
+        assert!((segment.torque_rate_rms_n_m_per_s[0] - 30.0).abs() < 1e-6);
+        assert!((segment.torque_rate_rms_n_m_per_s[2] - 8.0).abs() < 1e-6);
+        assert!(segment.torque_rate_rms_n_m_per_s[1].abs() < 1e-12);
+        // Integral of t exp(-2t) from 0 to 3 is (1 - 7 exp(-6))/4; the sum is off by at most one step.
+        assert!((segment.itae_rad_s2[0] - 0.25 * (1.0 - 7.0 * (-6.0_f64).exp())).abs() < STEP_S);
+    }
+
+    #[test]
+    fn a_joint_still_outside_at_the_end_has_not_settled() {
+        let segment = measured(1.0);
+        assert_eq!(segment.settling_time_s[0], None);
+        assert_eq!(segment.slowest_settling_time_s(), None);
+        let settled = measured(3.0);
+        assert_eq!(settled.slowest_settling_time_s(), settled.settling_time_s[0].max(settled.settling_time_s[1]));
+    }
+}

@@ -1,0 +1,148 @@
+//! An axis: its range, its scale, its ticks.
+
+use crate::format;
+
+/// One axis of a plot.
+#[derive(Clone, Debug)]
+pub(crate) struct Axis {
+    /// What is shown, with its unit.
+    pub(crate) caption: String,
+    scale: Scale,
+    lower: f64,
+    upper: f64,
+    ticks: Vec<(f64, String)>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scale {
+    Linear,
+    Log,
+}
+
+impl Axis {
+    /// Equal distances, about `count` ticks; the range is widened until it has a size.
+    pub(crate) fn linear(caption: impl Into<String>, (lower, upper): (f64, f64), count: usize) -> Self {
+        let size = upper - lower;
+        let tiny = 1e-9_f64.max(1e-6 * lower.abs().max(upper.abs()));
+        let (lower, upper) = if size > tiny { (lower, upper) } else { (lower - 0.5, upper + 0.5) };
+        let step = nice_step((upper - lower) / count.max(1) as f64);
+        let first = (lower / step - 1e-6).ceil() as i64;
+        // A recording ends one sample early: its last round tick still counts.
+        let last = (upper / step + 0.01 * (upper - lower) / step).floor() as i64;
+        let ticks =
+            (first..=last).map(|index| index as f64 * step).map(|value| (value, format::tick(value, step))).collect();
+        Self { caption: caption.into(), scale: Scale::Linear, lower, upper, ticks }
+    }
+
+    /// [`Axis::linear`] with a margin on both sides, so that no curve runs along the frame.
+    pub(crate) fn padded(caption: impl Into<String>, (lower, upper): (f64, f64), count: usize) -> Self {
+        let margin = 0.06 * (upper - lower);
+        Self::linear(caption, (lower - margin, upper + margin), count)
+    }
+
+    /// Equal ratios; both ends must be positive, otherwise the lower end is put six decades below the upper.
+    pub(crate) fn log(caption: impl Into<String>, (lower, upper): (f64, f64)) -> Self {
+        let upper = if upper > 0.0 { upper } else { 1.0 };
+        let lower = if lower > 0.0 && lower < upper { lower } else { upper * 1e-6 };
+        let margin = (upper / lower).powf(0.05).max(1.1);
+        let (lower, upper) = (lower / margin, upper * margin);
+        let (first, last) = (lower.log10().floor() as i32, upper.log10().ceil() as i32);
+        let stride = ((last - first) / 6 + 1) as usize;
+        let plain = first >= -3 && last <= 4;
+        let fine: &[f64] = match (upper / lower).log10() {
+            decades if decades < 1.2 => &[1.0, 2.0, 3.0, 5.0, 7.0],
+            decades if decades < 2.2 => &[1.0, 3.0],
+            _ => &[1.0],
+        };
+        let ticks = (first..=last)
+            .step_by(stride)
+            .flat_map(|exponent| {
+                fine.iter().map(move |digit| {
+                    let value = digit * 10_f64.powi(exponent);
+                    let label = match (plain, *digit > 1.0) {
+                        (true, _) => format::tick(value, 10_f64.powi(exponent)),
+                        (false, false) => format::decade(exponent),
+                        (false, true) => format::number(value),
+                    };
+                    (value, label)
+                })
+            })
+            .filter(|(value, _)| (lower..=upper).contains(value))
+            .collect();
+        Self { caption: caption.into(), scale: Scale::Log, lower, upper, ticks }
+    }
+
+    /// Rows with names, the first at the top.
+    pub(crate) fn rows(names: impl IntoIterator<Item = String>) -> Self {
+        let ticks: Vec<_> = names.into_iter().enumerate().map(|(row, name)| (row_at(row), name)).collect();
+        let lower = row_at(ticks.len().max(1)) + 0.5;
+        Self { caption: String::new(), scale: Scale::Linear, lower, upper: 0.5, ticks }
+    }
+
+    /// The range.
+    pub(crate) fn range(&self) -> (f64, f64) {
+        (self.lower, self.upper)
+    }
+
+    /// Ticks: where, and what they say.
+    pub(super) fn ticks(&self) -> &[(f64, String)] {
+        &self.ticks
+    }
+
+    /// Position in the range, 0 to 1; what lies outside is put on the nearer end. `None` for a NaN.
+    pub(super) fn fraction(&self, value: f64) -> Option<f64> {
+        let fraction = match self.scale {
+            Scale::Linear => (value - self.lower) / (self.upper - self.lower),
+            Scale::Log if value > 0.0 => (value / self.lower).ln() / (self.upper / self.lower).ln(),
+            Scale::Log if value <= 0.0 => 0.0,
+            Scale::Log => f64::NAN,
+        };
+        (!fraction.is_nan()).then(|| fraction.clamp(0.0, 1.0))
+    }
+}
+
+/// Where row `index` of [`Axis::rows`] lies.
+pub(crate) fn row_at(index: usize) -> f64 {
+    -(index as f64)
+}
+
+/// The smallest of 1, 2, 5 times a power of ten that is not below `rough`.
+fn nice_step(rough: f64) -> f64 {
+    let power = 10_f64.powf(rough.log10().floor());
+    [1.0, 2.0, 5.0].into_iter().map(|digit| digit * power).find(|step| *step >= rough * 0.999).unwrap_or(10.0 * power)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(axis: &Axis) -> Vec<&str> {
+        axis.ticks().iter().map(|(_, label)| label.as_str()).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_and_inside_the_range() {
+        assert_eq!(labels(&Axis::linear("", (0.0, 24.0), 5)), ["0", "5", "10", "15", "20"]);
+        assert_eq!(labels(&Axis::linear("", (-0.31, 1.02), 4)), ["0", "0.5", "1.0"]);
+        assert_eq!(labels(&Axis::log("", (0.002, 1.9))), ["0.01", "0.1", "1"]);
+        assert_eq!(labels(&Axis::log("", (0.32, 1.4))), ["0.3", "0.5", "0.7", "1"]);
+    }
+
+    #[test]
+    fn a_range_without_size_is_widened_and_nan_has_no_place() {
+        let flat = Axis::linear("", (2.0, 2.0), 4);
+        assert_eq!(flat.fraction(2.0), Some(0.5));
+        assert_eq!(flat.fraction(1e9), Some(1.0));
+        assert_eq!(flat.fraction(f64::NAN), None);
+        let log = Axis::log("", (0.0, 0.0));
+        assert_eq!(log.fraction(0.0), Some(0.0));
+        assert_eq!(log.fraction(f64::NAN), None);
+    }
+
+    #[test]
+    fn rows_run_from_top_to_bottom() {
+        let rows = Axis::rows(["a".to_owned(), "b".to_owned()]);
+        assert_eq!(rows.fraction(row_at(0)), Some(0.75));
+        assert_eq!(rows.fraction(row_at(1)), Some(0.25));
+    }
+}

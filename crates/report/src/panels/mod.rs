@@ -1,0 +1,87 @@
+//! The figures of the page, one module for each section that has any.
+//!
+//! A wide figure comes in two drawings, for a desk and for a phone; the style sheet shows the one that fits, so that
+//! letters keep their size.
+
+mod certificate;
+mod held_out;
+mod response;
+mod search;
+mod sensitivity;
+
+use serde::Serialize;
+
+use crate::error::ReportError;
+use crate::record::TuningReport;
+
+/// Nominal sizes: three, two, or one figure a row; and the one of a phone.
+const THIRD: (f64, f64) = (336.0, 190.0);
+const HALF: (f64, f64) = (400.0, 270.0);
+const WIDE: (f64, f64) = (840.0, 290.0);
+const PHONE: (f64, f64) = (360.0, 270.0);
+
+/// Points a curve keeps.
+const CURVE_POINTS: usize = 320;
+
+/// A figure in both widths.
+#[derive(Debug, Serialize)]
+pub(crate) struct TwoWidths {
+    /// For a desk and for paper.
+    wide: String,
+    /// For a phone.
+    narrow: String,
+}
+
+impl TwoWidths {
+    fn new(plot: impl Fn((f64, f64)) -> crate::figure::Plot) -> Result<Self, ReportError> {
+        Ok(Self { wide: plot(WIDE).svg()?, narrow: plot(PHONE).svg()? })
+    }
+}
+
+/// Every figure as SVG; `None` or empty where the record has no data for it.
+#[derive(Debug, Serialize)]
+pub(crate) struct Panels {
+    /// Joint angles, one figure a joint.
+    pub(crate) positions: Vec<String>,
+    /// Torques, one figure a joint.
+    pub(crate) torques: Vec<String>,
+    /// Free energy.
+    pub(crate) free_energy: Option<TwoWidths>,
+    /// Error over time on the held-out plants.
+    pub(crate) bands: Option<String>,
+    /// Cost of each held-out plant.
+    pub(crate) plants: Option<String>,
+    /// Course of the search.
+    pub(crate) search: Option<TwoWidths>,
+    /// Cost against single gains.
+    pub(crate) sensitivity: Option<String>,
+    /// All poles, and those near the imaginary axis.
+    pub(crate) poles: Vec<String>,
+    /// Certified radius against the moves.
+    pub(crate) region: Option<String>,
+}
+
+impl Panels {
+    /// Draws them all.
+    ///
+    /// # Errors
+    /// [`ReportError::Draw`] when the drawing library fails.
+    pub(crate) fn new(record: &TuningReport) -> Result<Self, ReportError> {
+        Ok(Self {
+            positions: response::positions(&record.response)?,
+            torques: response::torques(&record.response)?,
+            free_energy: response::free_energy(&record.response)?,
+            bands: held_out::bands(&record.held_out)?,
+            plants: held_out::plants(record)?,
+            search: search::convergence(record)?,
+            sensitivity: sensitivity::bars(record)?,
+            poles: certificate::poles(&record.certificate)?,
+            region: certificate::region(&record.certificate)?,
+        })
+    }
+}
+
+/// Points of a curve from two series.
+fn curve(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
+    x.iter().copied().zip(y.iter().copied()).collect()
+}

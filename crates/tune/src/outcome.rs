@@ -1,0 +1,270 @@
+//! What became of a candidate, and which of two fates is better.
+//!
+//! ```text
+//! Certified(cost) < Simulated(cost) < Uncertified(cost) < Unstable(abscissa) < Diverged(time)
+//! ```
+//!
+//! The order is total: within a rank a lower cost, a smaller abscissa or a *later* divergence is better, and every number is
+//! [`Finite`], so that no comparison meets NaN. A failure is never a cost with a penalty added, since a penalty has a size that somebody must
+//! choose and a good candidate can be beaten by it.
+//!
+//! A solver of argmin compares `f64`. [`Outcome::score`] embeds the order in the interval `[0, 5)`: rank `r` occupies `[r, r + 1)`,
+//! and inside a rank the 64 bits of a finite number, read as an integer that increases with the number, are divided by 2^64. That
+//! scale is piecewise logarithmic, one octave per 2^-12, so it separates costs by their ratio:
+//! - it never reverses the order of two outcomes;
+//! - it separates two outcomes of different rank, and two numbers whose ratio differs from 1 by more than 1e-11.
+//!
+//! Records keep the [`Outcome`]; the score exists only while a solver runs.
+
+use core::cmp::Ordering;
+
+use serde::{Deserialize, Serialize};
+
+/// A number that is neither NaN nor infinite, hence totally ordered.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(try_from = "f64", into = "f64")]
+pub struct Finite(f64);
+
+/// A number that is not finite where only a finite one has a rank.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("got {value}, expected a finite number")]
+pub struct NotFinite {
+    /// The number given.
+    pub value: f64,
+}
+
+impl Finite {
+    /// The number `value`; minus zero becomes zero.
+    ///
+    /// # Errors
+    /// [`NotFinite`] for NaN and the infinities.
+    pub fn new(value: f64) -> Result<Self, NotFinite> {
+        if value.is_finite() { Ok(Self(value + 0.0)) } else { Err(NotFinite { value }) }
+    }
+
+    /// The number `value`, where the worst of its kind is the largest: NaN and infinity become the largest finite number.
+    pub fn saturating(value: f64) -> Self {
+        if value == f64::NEG_INFINITY { Self(f64::MIN) } else { Self::new(value).unwrap_or(Self(f64::MAX)) }
+    }
+
+    /// The number.
+    pub const fn get(self) -> f64 {
+        self.0
+    }
+
+    /// An integer that increases with the number.
+    const fn key(self) -> u64 {
+        let bits = self.0.to_bits();
+        if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
+    }
+}
+
+impl TryFrom<f64> for Finite {
+    type Error = NotFinite;
+    fn try_from(value: f64) -> Result<Self, NotFinite> {
+        Self::new(value)
+    }
+}
+
+impl From<Finite> for f64 {
+    fn from(number: Finite) -> Self {
+        number.0
+    }
+}
+
+impl PartialEq for Finite {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Finite {}
+
+impl PartialOrd for Finite {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Finite {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.key().cmp(&other.key())
+    }
+}
+
+/// What became of a candidate; `a < b` reads "a is better than b".
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "rank", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Outcome {
+    /// Simulated on every plant of the batch, and a certificate holds.
+    Certified {
+        /// Cost of the batch, s.
+        cost_s: Finite,
+    },
+    /// Simulated on every plant of the batch; nobody has tried to certify it.
+    Simulated {
+        /// Cost of the batch, s.
+        cost_s: Finite,
+    },
+    /// Simulated on every plant of the batch, but the certificate was refused.
+    Uncertified {
+        /// Cost of the batch, s.
+        cost_s: Finite,
+    },
+    /// Not simulated: a linearised loop of the sample grows.
+    Unstable {
+        /// The fastest growth found, 1/s.
+        abscissa_per_s: Finite,
+    },
+    /// A simulated arm ran away.
+    Diverged {
+        /// When the first arm of the batch did, s.
+        at_s: Finite,
+    },
+}
+
+impl Outcome {
+    /// The rank, 0 the best.
+    const fn rank(self) -> u8 {
+        match self {
+            Self::Certified { .. } => 0,
+            Self::Simulated { .. } => 1,
+            Self::Uncertified { .. } => 2,
+            Self::Unstable { .. } => 3,
+            Self::Diverged { .. } => 4,
+        }
+    }
+
+    /// An integer that increases as outcomes of one rank get worse.
+    const fn key(self) -> u64 {
+        match self {
+            Self::Certified { cost_s } | Self::Simulated { cost_s } | Self::Uncertified { cost_s } => cost_s.key(),
+            Self::Unstable { abscissa_per_s } => abscissa_per_s.key(),
+            Self::Diverged { at_s } => !at_s.key(),
+        }
+    }
+
+    /// The place of the outcome on a line, in `[0, 5)`, lower is better: see the [module](self).
+    pub fn score(self) -> f64 {
+        f64::from(self.rank()) + self.key() as f64 * KEY_UNIT
+    }
+
+    /// The cost in s, for an outcome that has one.
+    pub const fn cost_s(self) -> Option<f64> {
+        match self {
+            Self::Certified { cost_s } | Self::Simulated { cost_s } | Self::Uncertified { cost_s } => {
+                Some(cost_s.get())
+            }
+            Self::Unstable { .. } | Self::Diverged { .. } => None,
+        }
+    }
+}
+
+/// 2^-64.
+const KEY_UNIT: f64 = 1.0 / 18_446_744_073_709_551_616.0;
+
+/// How far [`Outcome::score`] moves when a number of that rank changes by the small fraction `relative` (at least: the scale is linear within an
+/// octave, and an octave spans 2^-12).
+pub(crate) const fn score_of_ratio(relative: f64) -> f64 {
+    relative / 4096.0
+}
+
+impl PartialOrd for Outcome {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Outcome {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.rank().cmp(&other.rank()).then(self.key().cmp(&other.key()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn number() -> impl Strategy<Value = Finite> {
+        prop_oneof![
+            any::<f64>().prop_filter_map("finite", |x| Finite::new(x).ok()),
+            (-1e3..1e3).prop_filter_map("finite", |x: f64| Finite::new(x).ok()),
+        ]
+    }
+
+    fn outcome() -> impl Strategy<Value = Outcome> {
+        (0..5, number()).prop_map(|(rank, x)| match rank {
+            0 => Outcome::Certified { cost_s: x },
+            1 => Outcome::Simulated { cost_s: x },
+            2 => Outcome::Uncertified { cost_s: x },
+            3 => Outcome::Unstable { abscissa_per_s: x },
+            _ => Outcome::Diverged { at_s: x },
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn the_order_of_numbers_is_the_order_of_reals(a in number(), b in number()) {
+            prop_assert_eq!(Some(a.cmp(&b)), a.get().partial_cmp(&b.get()));
+        }
+
+        #[test]
+        fn the_order_is_total(a in outcome(), b in outcome(), c in outcome()) {
+            prop_assert_eq!(a.cmp(&b), b.cmp(&a).reverse());
+            prop_assert_eq!(a.cmp(&b) == Ordering::Equal, a == b);
+            if a <= b && b <= c {
+                prop_assert!(a <= c);
+            }
+        }
+
+        #[test]
+        fn the_score_never_reverses_the_order(a in outcome(), b in outcome()) {
+            prop_assert!((0.0..5.0).contains(&a.score()));
+            if a < b {
+                prop_assert!(a.score() <= b.score(), "{a:?} {b:?}");
+            }
+            if a.rank() < b.rank() {
+                prop_assert!(a.score() < b.score());
+            }
+        }
+
+        #[test]
+        fn the_score_separates_close_costs(x in 1e-12..1e12_f64, ratio in 1e-11..1.0_f64) {
+            let near = Finite::new(x).unwrap();
+            let far = Finite::new(x * (1.0 + ratio)).unwrap();
+            let pairs = [
+                [Outcome::Simulated { cost_s: near }, Outcome::Simulated { cost_s: far }],
+                [Outcome::Unstable { abscissa_per_s: near }, Outcome::Unstable { abscissa_per_s: far }],
+                [Outcome::Diverged { at_s: far }, Outcome::Diverged { at_s: near }],
+            ];
+            for [better, worse] in pairs {
+                prop_assert!(better.score() < worse.score(), "{better:?} {worse:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_later_divergence_is_better_and_any_divergence_is_the_worst() {
+        let at = |at_s| Outcome::Diverged { at_s: Finite::new(at_s).unwrap() };
+        assert!(at(3.0) < at(1.0));
+        assert!(Outcome::Unstable { abscissa_per_s: Finite::saturating(f64::NAN) } < at(30.0));
+        assert!(
+            Outcome::Uncertified { cost_s: Finite::saturating(f64::INFINITY) }
+                < Outcome::Unstable { abscissa_per_s: Finite::saturating(1e-9) }
+        );
+    }
+
+    #[test]
+    fn what_is_not_finite_has_no_rank() {
+        assert!(Finite::new(f64::NAN).is_err());
+        assert_eq!(Finite::new(-0.0).unwrap(), Finite::new(0.0).unwrap());
+        assert!(serde_json::from_str::<Finite>("null").is_err());
+        let text = serde_json::to_string(&Outcome::Diverged { at_s: Finite::new(2.5).unwrap() }).unwrap();
+        assert_eq!(text, r#"{"rank":"diverged","at_s":2.5}"#);
+        assert_eq!(
+            serde_json::from_str::<Outcome>(&text).unwrap(),
+            Outcome::Diverged { at_s: Finite::new(2.5).unwrap() }
+        );
+    }
+}

@@ -1,0 +1,167 @@
+//! What a tuning run leaves behind: every number that led to the gains, and nothing that differs from run to run.
+//!
+//! No time, host or thread count is recorded, so two runs with the same question and versions give the same bytes.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use crate::gains::{Gain, Gains};
+use crate::outcome::Outcome;
+use crate::search::{Evaluation, SearchSettings, Termination};
+use crate::space::{Freedom, Space};
+
+/// The version of the record that this crate writes.
+pub const RECORD_SCHEMA: u32 = 1;
+
+/// What was asked, in names and numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Question {
+    /// Name of the robot.
+    pub robot: String,
+    /// SHA-256 of the robot's canonical description.
+    pub robot_sha256: String,
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Names and versions of the programs and libraries that took part.
+    pub versions: BTreeMap<String, String>,
+    /// The search.
+    pub search: SearchSettings,
+    /// Plants on which every candidate is simulated.
+    pub batch_plants: usize,
+    /// Plants that judge the winner.
+    pub held_out_plants: usize,
+    /// The most candidates that are brought before the certifier; the start, if none of them passes, comes on top. At least 1.
+    pub certification_attempts: usize,
+}
+
+/// One gain of the space.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SpaceGain {
+    /// The gain.
+    pub gain: Gain,
+    /// Its fixed value or its range.
+    pub freedom: Freedom,
+}
+
+/// A visit to the certifier.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Attempt {
+    /// The candidate, by the index of its evaluation.
+    pub evaluation: usize,
+    /// Why it was refused; `None` if it was certified.
+    pub refusal: Option<String>,
+}
+
+/// What one plant says about one set of gains.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlantResult {
+    /// Index of the draw.
+    pub plant: u64,
+    /// What became of the run.
+    pub outcome: Outcome,
+    /// Figures of the run as far as it went.
+    pub figures: Figures,
+}
+
+/// Figures of one run: the worst over its segments and joints, except where said.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Figures {
+    /// Longest time until a joint stays within 2 % of its step; `None` if one never does.
+    pub settling_time_s: Option<f64>,
+    /// Largest error at the end of a segment.
+    pub final_error_rad: Option<f64>,
+    /// Largest overshoot, as a fraction of the joint's step.
+    pub overshoot: Option<f64>,
+    /// Largest torque.
+    pub peak_torque_n_m: Option<f64>,
+    /// Jitter: the largest root mean square of a torque's rate.
+    pub torque_rate_rms_n_m_per_s: Option<f64>,
+    /// Steps with a torque at its limit, summed over segments and joints.
+    pub saturated_steps: u64,
+}
+
+/// The judgement of plants that the search never saw, over the same plants for both.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeldOut {
+    /// Outcome of the start over the plants, aggregated as in the search; `None` without a start.
+    pub start: Option<Verdict>,
+    /// The same for the winner; `None` without a winner.
+    pub tuned: Option<Verdict>,
+}
+
+/// One set of gains before the held-out plants.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Verdict {
+    /// All plants together.
+    pub outcome: Outcome,
+    /// Each plant.
+    pub plants: Vec<PlantResult>,
+}
+
+/// What a change of one gain of the winner does to the outcome on the batch.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sensitivity {
+    /// The gain.
+    pub gain: Gain,
+    /// With the gain times 0.9.
+    pub at_minus_10_percent: Outcome,
+    /// With the gain times 1.1.
+    pub at_plus_10_percent: Outcome,
+}
+
+/// The record of a tuning run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunRecord {
+    /// [`RECORD_SCHEMA`].
+    pub schema: u32,
+    /// What was asked.
+    pub question: Question,
+    /// Where was searched.
+    pub space: Vec<SpaceGain>,
+    /// Every candidate in order, with its final rank.
+    pub evaluations: Vec<Evaluation>,
+    /// Why the search ended.
+    pub termination: Termination,
+    /// Every visit to the certifier in order.
+    pub certification: Vec<Attempt>,
+    /// The evaluation of the start.
+    pub start: Option<usize>,
+    /// The evaluation of the best certified candidate; `None` if no candidate was certified.
+    pub winner: Option<usize>,
+    /// What plants say that the search never saw.
+    pub held_out: HeldOut,
+    /// How much each free gain of the winner matters.
+    pub sensitivity: Vec<Sensitivity>,
+}
+
+impl RunRecord {
+    /// The start, as evaluated.
+    pub fn start(&self) -> Option<&Evaluation> {
+        self.evaluations.get(self.start?)
+    }
+
+    /// The best certified candidate.
+    pub fn winner(&self) -> Option<&Evaluation> {
+        self.evaluations.get(self.winner?)
+    }
+
+    /// The winner's gains.
+    pub fn tuned(&self) -> Option<&Gains> {
+        self.winner().map(|evaluation| &evaluation.gains)
+    }
+}
+
+/// The rows of a space, in the order of a file.
+pub(crate) fn space_rows(space: &Space) -> Vec<SpaceGain> {
+    Gain::ALL.into_iter().map(|gain| SpaceGain { gain, freedom: space.freedom(gain) }).collect()
+}

@@ -1,0 +1,199 @@
+//! Derivative-free search with an exact budget of evaluations, driven by argmin.
+//!
+//! - Nelder-Mead ([`Method::NelderMead`]) starts at given gains (the middle of the space without any) with one corner of the simplex per coordinate,
+//!   and starts again around the best point, with steps of the other sign, whenever the corners agree to within [`SPREAD`].
+//! - Particle swarm ([`Method::ParticleSwarm`]) starts from random points of the whole space. Given gains are evaluated first, so that the record can
+//!   compare, but the swarm does not see them.
+//!
+//! **Budget.** At most `evaluations` calls reach the objective; argmin counts iterations, so the count is kept by the cost function that argmin sees, and the call
+//! after the last ends the run. A candidate met a second time (the same gains after rounding) costs nothing.
+//!
+//! **Reproducibility.** Nelder-Mead asks for one candidate at a time; a swarm's generation is evaluated in parallel and recorded in the order of
+//! its particles. All chance comes from ChaCha8 seeded with `seed`. The record therefore does not depend on the number of threads if the objective does not.
+//!
+//! Limits: Nelder-Mead has no proof of convergence; the record says how it ended, not that it found the best gains.
+
+mod ledger;
+mod nelder_mead;
+mod swarm;
+
+use serde::{Deserialize, Serialize};
+
+pub use nelder_mead::SPREAD;
+
+use crate::gains::Gains;
+use crate::outcome::Outcome;
+use crate::space::{Method, Space, SpaceError};
+use ledger::Ledger;
+
+/// What turns gains into an outcome. Total: an objective that fails says so by a rank of [`Outcome`].
+pub trait Objective: Sync {
+    /// The outcome of `gains`: a pure function of them.
+    fn evaluate(&self, gains: &Gains) -> Outcome;
+}
+
+impl<F: Fn(&Gains) -> Outcome + Sync> Objective for F {
+    fn evaluate(&self, gains: &Gains) -> Outcome {
+        self(gains)
+    }
+}
+
+/// Who is told about the progress of a search; `()` is nobody.
+pub trait Progress: Sync {
+    /// `evaluation` has been recorded, the `done`-th of at most `evaluations`; `best` is the best so far.
+    fn evaluated(&self, done: usize, evaluations: usize, evaluation: &Evaluation, best: &Evaluation);
+}
+
+impl Progress for () {
+    fn evaluated(&self, _: usize, _: usize, _: &Evaluation, _: &Evaluation) {}
+}
+
+/// Which part of a search asked for an evaluation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "name", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Phase {
+    /// The gains that the search was given.
+    Start,
+    /// Nelder-Mead.
+    Simplex {
+        /// 0 for the first simplex, then the number of the restart.
+        restart: usize,
+    },
+    /// Particle swarm.
+    Swarm {
+        /// 0 for the random start.
+        generation: usize,
+    },
+}
+
+/// One candidate and what became of it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Evaluation {
+    /// Its place in the order of the search, from 0.
+    pub index: usize,
+    /// Which part of the search asked.
+    pub phase: Phase,
+    /// The candidate.
+    pub gains: Gains,
+    /// What became of it.
+    pub outcome: Outcome,
+}
+
+/// Why a search ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "reason", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Termination {
+    /// Every evaluation was used.
+    BudgetSpent,
+    /// The solver met only candidates that it knew, although evaluations were left.
+    Converged,
+}
+
+/// How to search.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SearchSettings {
+    /// The solver.
+    pub method: Method,
+    /// How many candidates may be evaluated, at least 1.
+    pub evaluations: usize,
+    /// The seed of the swarm; Nelder-Mead draws nothing.
+    pub seed: u64,
+    /// Particles of the swarm, at least 2. Default 10.
+    pub particles: usize,
+    /// Size of the first simplex along each coordinate, a fraction of the range in `(0, 0.5]`. Default 0.15.
+    pub simplex_step: f64,
+}
+
+impl SearchSettings {
+    /// Settings with the default swarm and simplex.
+    pub const fn new(method: Method, evaluations: usize, seed: u64) -> Self {
+        Self { method, evaluations, seed, particles: 10, simplex_step: 0.15 }
+    }
+}
+
+/// Why a search could not run.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SearchError {
+    /// No evaluation is allowed.
+    #[error("a search needs a budget of at least 1 evaluation, got 0")]
+    NoBudget,
+    /// A swarm needs somebody to follow.
+    #[error("a swarm needs at least 2 particles, got {particles}")]
+    Particles {
+        /// The number given.
+        particles: usize,
+    },
+    /// A simplex without extent, or wider than the space.
+    #[error("the first simplex spans {simplex_step} of the range, expected more than 0 and at most 0.5")]
+    SimplexStep {
+        /// The fraction given.
+        simplex_step: f64,
+    },
+    /// The start does not lie in the space.
+    #[error(transparent)]
+    Start(#[from] SpaceError),
+    /// The solver refused its parameters or lost its state, neither of which a search of this crate can cause.
+    #[error("the {method:?} solver failed after {evaluations} evaluations")]
+    Solver {
+        /// The solver.
+        method: Method,
+        /// How many candidates had been evaluated.
+        evaluations: usize,
+    },
+}
+
+/// A finished search.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SearchRun {
+    /// Every evaluation in order; at least one.
+    pub evaluations: Vec<Evaluation>,
+    /// Why it ended.
+    pub termination: Termination,
+}
+
+impl SearchRun {
+    /// The evaluations from the best to the worst; of equals the earlier first.
+    pub fn ranked(&self) -> Vec<&Evaluation> {
+        let mut ranked: Vec<_> = self.evaluations.iter().collect();
+        ranked.sort_by_key(|evaluation| (evaluation.outcome, evaluation.index));
+        ranked
+    }
+}
+
+/// Searches `space` for the gains with the best outcome.
+///
+/// `start` is written with the space's `sigma_q` first ([`Space::admit`]) and is evaluation 0 if given. Costs at most `settings.evaluations` calls
+/// of the objective; runs on the current rayon pool.
+///
+/// # Errors
+/// [`SearchError`] for settings out of range or a start outside the space.
+pub fn search(
+    space: &Space,
+    start: Option<&Gains>,
+    settings: &SearchSettings,
+    objective: &dyn Objective,
+    progress: &dyn Progress,
+) -> Result<SearchRun, SearchError> {
+    if settings.evaluations == 0 {
+        return Err(SearchError::NoBudget);
+    }
+    if settings.particles < 2 {
+        return Err(SearchError::Particles { particles: settings.particles });
+    }
+    if !(settings.simplex_step > 0.0 && settings.simplex_step <= 0.5) {
+        return Err(SearchError::SimplexStep { simplex_step: settings.simplex_step });
+    }
+    let start = start.map(|gains| space.admit(gains)).transpose()?;
+    let ledger = Ledger::new(space, objective, progress, settings.evaluations);
+    let termination = match start.map_or(Ok(()), |gains| ledger.evaluate_start(gains)) {
+        Err(ledger::BudgetSpent) => Termination::BudgetSpent,
+        Ok(()) => match settings.method {
+            Method::NelderMead => nelder_mead::run(&ledger, start.as_ref(), settings)?,
+            Method::ParticleSwarm => swarm::run(&ledger, settings)?,
+        },
+    };
+    Ok(SearchRun { evaluations: ledger.into_evaluations(), termination })
+}

@@ -1,0 +1,190 @@
+//! From a question to certified gains: search, certify, judge.
+//!
+//! 1. [`search`] ranks candidates by simulation; the start is among them.
+//! 2. The simulated candidates go before the certifier from the lowest cost upwards until one is certified. A candidate closer than
+//!    [`NEIGHBOUR`] in every coordinate to one that was refused is passed over: its certificate would fail for the same reason.
+//!    When the attempts are used up without a certificate, the start is tried last.
+//! 3. Start and winner run on plants that the search never saw, and each free gain of the winner is changed by ±10 %.
+//!
+//! The certifier is a closure, so this module knows nothing about proofs: whoever calls it decides what "certified" means, and keeps the evidence.
+
+use core::fmt::Display;
+
+use rayon::prelude::*;
+
+use crate::gains::Gains;
+use crate::outcome::Outcome;
+use crate::record::{Attempt, HeldOut, Question, RECORD_SCHEMA, RunRecord, Sensitivity, Verdict, space_rows};
+use crate::search::{Evaluation, Objective, Progress, SearchError, SearchRun, search};
+use crate::space::Space;
+
+/// Distance, as a fraction of each gain's range, below which two candidates share the fate of one certificate.
+pub const NEIGHBOUR: f64 = 0.01;
+
+/// Plants that the search never sees.
+pub trait Judge: Sync {
+    /// What each plant says about `gains`, and all of them together: a pure function of the gains.
+    fn judge(&self, gains: &Gains) -> Verdict;
+}
+
+/// What a run is busy with, for [`TuneProgress`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stage<'a> {
+    /// The search; its evaluations are reported through [`Progress`].
+    Search,
+    /// A candidate is before the certifier.
+    Certify {
+        /// The visit, from 1.
+        attempt: usize,
+        /// The candidate.
+        candidate: &'a Evaluation,
+    },
+    /// Held-out plants and sensitivities.
+    Judge,
+}
+
+/// Who is told about the progress of a run; `()` is nobody.
+pub trait TuneProgress: Progress {
+    /// A stage begins.
+    fn stage(&self, stage: Stage<'_>);
+}
+
+impl TuneProgress for () {
+    fn stage(&self, _: Stage<'_>) {}
+}
+
+/// Why a run could not be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TuneError {
+    /// The search was refused.
+    #[error(transparent)]
+    Search(#[from] SearchError),
+    /// Without a visit to the certifier nothing can win.
+    #[error("a run needs at least 1 certification attempt, got 0")]
+    NoAttempts,
+}
+
+/// A finished run.
+#[derive(Clone, Debug)]
+pub struct Tuned<C> {
+    /// What happened.
+    pub record: RunRecord,
+    /// The winner's evidence, as the certifier returned it; `None` exactly when the record has no winner.
+    pub certificate: Option<C>,
+}
+
+/// The parts that a run is made of.
+#[derive(Clone, Copy)]
+pub struct Bench<'a> {
+    /// Scores a candidate during the search.
+    pub objective: &'a dyn Objective,
+    /// Judges start and winner afterwards.
+    pub judge: &'a dyn Judge,
+    /// Hears how it goes.
+    pub progress: &'a dyn TuneProgress,
+}
+
+/// Searches `space`, certifies the best candidate that can be certified, and judges it.
+///
+/// `certify` returns the evidence for gains, or why there is none. It is called from the current thread, at most
+/// `question.certification_attempts + 1` times. A run in which nothing is certified is no error: its record has no winner.
+///
+/// # Errors
+/// [`TuneError`] for settings out of range or a start outside the space.
+pub fn tune<C, R: Display>(
+    question: Question,
+    space: &Space,
+    start: Option<&Gains>,
+    bench: Bench<'_>,
+    certify: impl FnMut(&Gains) -> Result<C, R>,
+) -> Result<Tuned<C>, TuneError> {
+    if question.certification_attempts == 0 {
+        return Err(TuneError::NoAttempts);
+    }
+    let Bench { objective, judge, progress } = bench;
+    progress.stage(Stage::Search);
+    let mut run = search(space, start, &question.search, objective, progress)?;
+    let start = start.map(|_| 0);
+    let (certification, winner) =
+        certify_best(&mut run, space, start, question.certification_attempts, progress, certify);
+
+    progress.stage(Stage::Judge);
+    let winner_index = winner.as_ref().map(|(index, _)| *index);
+    let gains_at = |index: Option<usize>| index.and_then(|index| run.evaluations.get(index)).map(|found| found.gains);
+    let (start_gains, tuned_gains) = (gains_at(start), gains_at(winner_index));
+    let start_verdict = start_gains.map(|gains| judge.judge(&gains));
+    let tuned_verdict =
+        if winner_index == start { start_verdict.clone() } else { tuned_gains.map(|gains| judge.judge(&gains)) };
+    let record = RunRecord {
+        schema: RECORD_SCHEMA,
+        question,
+        space: space_rows(space),
+        termination: run.termination,
+        certification,
+        start,
+        winner: winner_index,
+        held_out: HeldOut { start: start_verdict, tuned: tuned_verdict },
+        sensitivity: tuned_gains.map_or_else(Vec::new, |gains| sensitivity(space, objective, &gains)),
+        evaluations: run.evaluations,
+    };
+    Ok(Tuned { record, certificate: winner.map(|(_, certificate)| certificate) })
+}
+
+/// Brings candidates before `certify` and writes the verdicts into their outcomes.
+fn certify_best<C, R: Display>(
+    run: &mut SearchRun,
+    space: &Space,
+    start: Option<usize>,
+    attempts: usize,
+    progress: &dyn TuneProgress,
+    mut certify: impl FnMut(&Gains) -> Result<C, R>,
+) -> (Vec<Attempt>, Option<(usize, C)>) {
+    let simulated = |evaluation: &&Evaluation| matches!(evaluation.outcome, Outcome::Simulated { .. });
+    let queue: Vec<Evaluation> = run.ranked().into_iter().filter(simulated).copied().collect();
+    let last_resort: Vec<Evaluation> =
+        queue.iter().filter(|candidate| Some(candidate.index) == start).copied().collect();
+    let mut visits: Vec<Attempt> = Vec::new();
+    let mut refused: Vec<Vec<f64>> = Vec::new();
+    for (candidate, is_last_resort) in
+        queue.iter().map(|candidate| (candidate, false)).chain(last_resort.iter().map(|candidate| (candidate, true)))
+    {
+        let point = space.encode(&candidate.gains);
+        let visited = visits.iter().any(|visit| visit.evaluation == candidate.index);
+        let hopeless = visits.len() >= attempts || refused.iter().any(|other| are_neighbours(other, &point));
+        if visited || (hopeless && !is_last_resort) {
+            continue;
+        }
+        progress.stage(Stage::Certify { attempt: visits.len() + 1, candidate });
+        let Outcome::Simulated { cost_s } = candidate.outcome else { continue };
+        match certify(&candidate.gains) {
+            Ok(certificate) => {
+                visits.push(Attempt { evaluation: candidate.index, refusal: None });
+                run.evaluations[candidate.index].outcome = Outcome::Certified { cost_s };
+                return (visits, Some((candidate.index, certificate)));
+            }
+            Err(reason) => {
+                visits.push(Attempt { evaluation: candidate.index, refusal: Some(reason.to_string()) });
+                run.evaluations[candidate.index].outcome = Outcome::Uncertified { cost_s };
+                refused.push(point);
+            }
+        }
+    }
+    (visits, None)
+}
+
+fn are_neighbours(a: &[f64], b: &[f64]) -> bool {
+    a.iter().zip(b).all(|(a, b)| (a - b).abs() < NEIGHBOUR)
+}
+
+/// What a change of each free gain by ±10 % does to the outcome; the bounds of the space do not apply. Costs two evaluations per free gain.
+pub fn sensitivity(space: &Space, objective: &dyn Objective, gains: &Gains) -> Vec<Sensitivity> {
+    let free: Vec<_> = space.free().map(|(gain, _)| gain).collect();
+    let outcome = |gain, factor: f64| objective.evaluate(&gains.with(gain, gains.get(gain) * factor));
+    free.into_par_iter()
+        .map(|gain| Sensitivity {
+            gain,
+            at_minus_10_percent: outcome(gain, 0.9),
+            at_plus_10_percent: outcome(gain, 1.1),
+        })
+        .collect()
+}

@@ -1,0 +1,189 @@
+//! The search finds known minima, spends its budget exactly, and does not depend on the number of threads.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use certune_tune::{
+    Evaluation, Finite, Freedom, Gain, Gains, Method, Outcome, Phase, Progress, Range, Scale, SearchError,
+    SearchSettings, Space, SpaceError, Termination, search,
+};
+use proptest::prelude::*;
+
+/// A space whose free gains are the first `free` of the list, each over `[0.01, 100]`.
+fn space(free: usize) -> Space {
+    let range = Freedom::Free(Range { lower: 0.01, upper: 100.0, scale: Scale::Log });
+    let order = [Gain::KappaMu, Gain::KappaA, Gain::SigmaDq, Gain::SigmaMu, Gain::SigmaDmu];
+    let freedoms = Gain::ALL.map(|gain| if order[..free].contains(&gain) { range } else { Freedom::Fixed(1.0) });
+    Space::new(Method::NelderMead, None, freedoms).expect("a valid space")
+}
+
+fn ones() -> Gains {
+    Gains {
+        kappa_mu: 1.0,
+        kappa_a: 1.0,
+        sigma_q: 1.0,
+        sigma_dq: 1.0,
+        sigma_mu: 1.0,
+        sigma_dmu: 1.0,
+        reference_time_constant_s: 1.0,
+    }
+}
+
+fn simulated(cost_s: f64) -> Outcome {
+    Outcome::Simulated { cost_s: Finite::saturating(cost_s) }
+}
+
+/// Squared distance, in natural logarithms, to a point that is far from the start in every gain.
+fn bowl(gains: &Gains) -> Outcome {
+    let squares = [
+        (Gain::KappaMu, 3.0_f64),
+        (Gain::KappaA, 0.2),
+        (Gain::SigmaDq, 5.0),
+        (Gain::SigmaMu, 0.5),
+        (Gain::SigmaDmu, 2.0),
+    ];
+    simulated(squares.iter().map(|(gain, at)| (gains.get(*gain) / at).ln().powi(2)).sum())
+}
+
+/// Rosenbrock's valley in the logarithms of two gains; minimum 0 at ln = (1, 1).
+fn valley(gains: &Gains) -> Outcome {
+    let (x, y) = (gains.kappa_mu.ln(), gains.kappa_a.ln());
+    simulated(100.0 * (y - x * x).powi(2) + (1.0 - x).powi(2))
+}
+
+/// A bowl with a cliff: half of the space is unstable, a corner of it diverges.
+fn cliff(gains: &Gains) -> Outcome {
+    if gains.kappa_mu * gains.kappa_a > 50.0 {
+        Outcome::Diverged { at_s: Finite::saturating(100.0 / gains.kappa_mu) }
+    } else if gains.kappa_mu > 3.5 {
+        Outcome::Unstable { abscissa_per_s: Finite::saturating(gains.kappa_mu - 3.5) }
+    } else {
+        bowl(gains)
+    }
+}
+
+fn cost_s(evaluation: &Evaluation) -> f64 {
+    evaluation.outcome.cost_s().expect("a simulated outcome")
+}
+
+#[test]
+fn nelder_mead_finds_the_bottom_of_a_bowl_in_five_gains() {
+    let settings = SearchSettings::new(Method::NelderMead, 400, 0);
+    let run = search(&space(5), Some(&ones()), &settings, &bowl, &()).unwrap();
+    let best = run.ranked()[0];
+    assert!(cost_s(best) < 1e-6, "{best:?}");
+    assert!((best.gains.kappa_mu / 3.0 - 1.0).abs() < 1e-2, "{best:?}");
+}
+
+#[test]
+fn nelder_mead_follows_rosenbrocks_valley() {
+    let settings = SearchSettings::new(Method::NelderMead, 300, 0);
+    let start = ones().with(Gain::KappaMu, (-1.2_f64).exp()).with(Gain::KappaA, std::f64::consts::E);
+    let run = search(&space(2), Some(&start), &settings, &valley, &()).unwrap();
+    assert!(cost_s(run.ranked()[0]) < 1e-6, "{:?}", run.ranked()[0]);
+}
+
+#[test]
+fn nelder_mead_walks_along_a_cliff_without_falling() {
+    let settings = SearchSettings::new(Method::NelderMead, 400, 0);
+    let run = search(&space(5), Some(&ones()), &settings, &cliff, &()).unwrap();
+    assert!(run.evaluations.iter().any(|evaluation| evaluation.outcome.cost_s().is_none()), "the cliff was never met");
+    assert!(cost_s(run.ranked()[0]) < 1e-3, "{:?}", run.ranked()[0]);
+}
+
+#[test]
+fn a_cold_swarm_finds_both() {
+    for (dimension, objective) in [(5, bowl as fn(&Gains) -> Outcome), (2, valley)] {
+        let settings = SearchSettings { particles: 20, ..SearchSettings::new(Method::ParticleSwarm, 3000, 7) };
+        let run = search(&space(dimension), None, &settings, &objective, &()).unwrap();
+        assert!(cost_s(run.ranked()[0]) < 1e-3, "{:?}", run.ranked()[0]);
+    }
+}
+
+#[test]
+fn a_swarm_does_not_see_the_start_and_depends_on_its_seed() {
+    let settings = SearchSettings::new(Method::ParticleSwarm, 40, 1);
+    let with = search(&space(5), Some(&ones()), &settings, &bowl, &()).unwrap().evaluations;
+    let without = search(&space(5), None, &settings, &bowl, &()).unwrap().evaluations;
+    assert_eq!(with[0].phase, Phase::Start);
+    assert!(with[1..].iter().zip(&without).all(|(a, b)| a.gains == b.gains));
+    let reseeded = search(&space(5), None, &SearchSettings { seed: 2, ..settings }, &bowl, &()).unwrap().evaluations;
+    assert_ne!(without[0].gains, reseeded[0].gains);
+}
+
+#[test]
+fn a_search_that_knows_everything_ends_before_its_budget() {
+    let flat = |_: &Gains| simulated(1.0);
+    let run = search(&space(1), Some(&ones()), &SearchSettings::new(Method::NelderMead, 1000, 0), &flat, &()).unwrap();
+    assert_eq!(run.termination, Termination::Converged);
+    assert!(run.evaluations.len() < 10);
+}
+
+#[test]
+fn progress_hears_every_evaluation_in_order() {
+    struct Counter(AtomicUsize);
+    impl Progress for Counter {
+        fn evaluated(&self, done: usize, evaluations: usize, evaluation: &Evaluation, best: &Evaluation) {
+            assert_eq!(done, self.0.fetch_add(1, Ordering::SeqCst) + 1);
+            assert_eq!(evaluation.index + 1, done);
+            assert!(evaluations == 35 && best.outcome <= evaluation.outcome);
+        }
+    }
+    for method in [Method::NelderMead, Method::ParticleSwarm] {
+        let counter = Counter(AtomicUsize::new(0));
+        search(&space(3), Some(&ones()), &SearchSettings::new(method, 35, 0), &bowl, &counter).unwrap();
+        assert_eq!(counter.0.into_inner(), 35);
+    }
+}
+
+#[test]
+fn settings_out_of_range_are_refused() {
+    let run = |settings: &SearchSettings| search(&space(2), None, settings, &bowl, &()).unwrap_err();
+    let good = SearchSettings::new(Method::NelderMead, 10, 0);
+    assert_eq!(run(&SearchSettings { evaluations: 0, ..good }), SearchError::NoBudget);
+    assert_eq!(run(&SearchSettings { particles: 1, ..good }), SearchError::Particles { particles: 1 });
+    assert_eq!(run(&SearchSettings { simplex_step: 0.0, ..good }), SearchError::SimplexStep { simplex_step: 0.0 });
+    assert!(matches!(run(&SearchSettings { simplex_step: f64::NAN, ..good }), SearchError::SimplexStep { .. }));
+    let outside = search(&space(2), Some(&ones().with(Gain::KappaA, 1e3)), &good, &bowl, &());
+    assert!(matches!(outside, Err(SearchError::Start(SpaceError::StartOutside { gain: Gain::KappaA, .. }))));
+}
+
+fn method() -> impl Strategy<Value = Method> {
+    prop_oneof![Just(Method::NelderMead), Just(Method::ParticleSwarm)]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn the_budget_is_exact(method in method(), budget in 1_usize..60, free in 1_usize..6, seed: u64, given: bool) {
+        let calls = AtomicUsize::new(0);
+        let counted = |gains: &Gains| {
+            calls.fetch_add(1, Ordering::SeqCst);
+            bowl(gains)
+        };
+        let start = given.then_some(ones());
+        let run = search(&space(free), start.as_ref(), &SearchSettings::new(method, budget, seed), &counted, &()).unwrap();
+        let calls = calls.into_inner();
+        prop_assert_eq!(run.evaluations.len(), calls);
+        match run.termination {
+            Termination::BudgetSpent => prop_assert_eq!(calls, budget),
+            Termination::Converged => prop_assert!(calls < budget),
+        }
+        prop_assert!(run.evaluations.iter().enumerate().all(|(index, evaluation)| evaluation.index == index));
+    }
+
+    #[test]
+    fn the_record_is_the_same_to_the_byte_for_any_number_of_threads(method in method(), seed: u64) {
+        let record = |threads| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let settings = SearchSettings::new(method, 60, seed);
+            let run = pool.install(|| search(&space(5), Some(&ones()), &settings, &cliff, &())).unwrap();
+            serde_json::to_string(&run).unwrap()
+        };
+        let one = record(1);
+        prop_assert_eq!(&one, &record(2));
+        prop_assert_eq!(&one, &record(4));
+        let read: certune_tune::SearchRun = serde_json::from_str(&one).unwrap();
+        prop_assert_eq!(serde_json::to_string(&read).unwrap(), one);
+    }
+}
