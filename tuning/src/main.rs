@@ -1,2 +1,30 @@
-//! autotune.
-fn main() {}
+//! `autotune`: tune the gains of a robot-arm controller, prove that the result is stable, and report.
+//!
+//! | module | what it holds |
+//! |--------|---------------|
+//! | `cli` | the command line's shape, and from there to a command |
+//! | `commands` | one file a command |
+//! | `catalogue` | robots, presets, scenarios and search spaces, by name or by path |
+//! | `run` | a run's folder: `gains.toml`, `run.json`, `certificate.json`, `report.html` |
+//! | `page` | a run's record into the data of its page |
+//! | `output` | tables, wrapped text, JSON, files written whole or not at all |
+//! | `progress` | bars on a terminal's stderr |
+//! | `error` | what can go wrong, and what to do about it |
+//!
+//! Exit codes: 0 every claim holds (a conditional one included, and said), 2 a claim is refused, not proved or rejected, 1 anything
+//! that kept the command from an answer.
+#![forbid(unsafe_code)]
+
+mod catalogue;
+mod cli;
+mod commands;
+mod error;
+mod output;
+mod page;
+mod progress;
+mod run;
+mod versions;
+
+fn main() -> std::process::ExitCode {
+    cli::run(std::env::args_os())
+}

@@ -141,7 +141,7 @@ impl SamplingOptions {
 }
 
 impl Default for SamplingOptions {
-    /// 2,000 samples, 32 starts per constant, 5 %: a third of a second for the Panda on two cores.
+    /// 2,000 samples, 32 starts per constant, 5 %: under a second for the Panda on two cores.
     fn default() -> Self {
         Self { samples: 2_000, local_starts: 32, margin: 0.05 }
     }

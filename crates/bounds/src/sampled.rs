@@ -22,7 +22,7 @@ const TORQUE_STARTS: usize = 16;
 
 /// The constants of a box over all angles, by sampling and local maximisation, widened by the margin of `options`.
 ///
-/// Deterministic, and independent of the number of threads. Runs on the current rayon pool. About a third of a second for the Panda with the
+/// Deterministic, and independent of the number of threads. Runs on the current rayon pool. Under a second for the Panda with the
 /// default options on two cores; the cost grows with the number of groups whose scale varies.
 ///
 /// ```
@@ -37,7 +37,7 @@ const TORQUE_STARTS: usize = 16;
 /// };
 /// let arms = ArmBox::<7>::new(&Model::new(&robot)?, &ranges)?;
 /// let found = sampled_constants(&arms, &SamplingOptions::default());
-/// // The heaviest configuration is the stretched arm with every mass at its upper end.
+/// // Every mass and rotor inertia is at its upper end there.
 /// assert!((found.raw.m_hi_kg_m2 - 6.753).abs() < 0.01);
 /// assert!(found.constants.m_hi_kg_m2 > 1.049 * found.raw.m_hi_kg_m2);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

@@ -5,6 +5,7 @@
 //! (`svec`: off-diagonal entries times sqrt 2), which is clarabel's order.
 
 use std::f64::consts::SQRT_2;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use certune_lapack as _;
 use clarabel::algebra::CscMatrix;
@@ -111,7 +112,10 @@ impl Program<'_> {
             .map_err(|_| SolveError::Stopped("settings"))?;
         let mut solver = DefaultSolver::new(&objective, &self.cost, &a, &b, &cones, settings)
             .map_err(|_| SolveError::Stopped("data"))?;
-        solver.solve();
+        // clarabel panics when a factorisation inside a cone fails; an iterate gone bad is no reason to end the program.
+        if catch_unwind(AssertUnwindSafe(|| solver.solve())).is_err() {
+            return Err(SolveError::Stopped("factorisation failed"));
+        }
         let point = |accurate| Ok(Solution { x: solver.solution.x.clone(), accurate });
         match solver.solution.status {
             SolverStatus::Solved => point(true),

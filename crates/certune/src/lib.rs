@@ -51,4 +51,4 @@ pub use certune_verify as verify;
 
 mod stability;
 
-pub use stability::{ArmCertifier, StabilityError, certificate_text, family_of, poles_per_s};
+pub use stability::{ArmCertifier, Effort, StabilityError, certificate_text, family_of, poles_per_s};

@@ -72,6 +72,30 @@ pub fn family_of(plant_box: &PlantBox) -> Result<FamilyValues, StabilityError> {
     })
 }
 
+/// How hard a certificate is searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Effort {
+    /// The region of the nonlinear loop.
+    pub region: RegionOptions,
+    /// The arm and configuration of a refusal.
+    pub counterexample: SearchOptions,
+}
+
+impl Default for Effort {
+    /// A few seconds at most on two cores.
+    fn default() -> Self {
+        let counterexample = SearchOptions {
+            samples: 1_000,
+            local_starts: 4,
+            evaluations_per_start: 300,
+            // An eigenvalue this far right is no rounding of a stable one, and the search may stop.
+            enough: 0.05,
+            ..SearchOptions::default()
+        };
+        Self { region: RegionOptions::default(), counterexample }
+    }
+}
+
 /// An arm with a family of plants, its constants found once, ready to certify any number of gains.
 #[derive(Clone, Debug)]
 pub struct ArmCertifier<const N: usize> {
@@ -118,10 +142,10 @@ impl<const N: usize> ArmCertifier<N> {
     /// # Errors
     /// When the gains are not valid; [`StabilityError::Certify`] would be a defect of this workspace.
     pub fn certify(&self, gains: &AicGains<N>, claims: Claims) -> Result<Certificate, StabilityError> {
-        self.certify_with(gains, claims, &RegionOptions::default())
+        self.certify_with(gains, claims, &Effort::default())
     }
 
-    /// As [`ArmCertifier::certify`], with a decay rate for the region and an effort of one's own.
+    /// As [`ArmCertifier::certify`], with an effort of one's own.
     ///
     /// # Errors
     /// As [`ArmCertifier::certify`].
@@ -129,12 +153,12 @@ impl<const N: usize> ArmCertifier<N> {
         &self,
         gains: &AicGains<N>,
         claims: Claims,
-        options: &RegionOptions,
+        effort: &Effort,
     ) -> Result<Certificate, StabilityError> {
         let params = AicParams::new(gains, STEP_S)?;
         let problem = Problem::new(&self.arm, &gain_values(gains), &self.family, &self.constant_values())?;
-        let attain = || self.unstable_member(&params).ok().flatten();
-        Ok(certify(&problem, claims, options, &attain)?)
+        let attain = || self.unstable_member(&params, &effort.counterexample).ok().flatten();
+        Ok(certify(&problem, claims, &effort.region, &attain)?)
     }
 
     fn constant_values(&self) -> SampledConstantValues {
@@ -153,21 +177,17 @@ impl<const N: usize> ArmCertifier<N> {
     }
 
     /// Searches the family for a member, configuration and friction whose linearised loop is unstable.
-    fn unstable_member(&self, params: &AicParams<N>) -> Result<Option<(UnstableLoop, Attained)>, StabilityError> {
+    fn unstable_member(
+        &self,
+        params: &AicParams<N>,
+        options: &SearchOptions,
+    ) -> Result<Option<(UnstableLoop, Attained)>, StabilityError> {
         let [least, largest] = self.family.friction_n_m_s_per_rad;
         let mut axes = self.members.axes();
         axes.push(Axis::Interval { lower: least, upper: largest });
-        // An eigenvalue this far right is no rounding of a stable one, and the search may stop.
-        let options = SearchOptions {
-            samples: 2_000,
-            local_starts: 8,
-            evaluations_per_start: 400,
-            enough: 0.05,
-            ..SearchOptions::default()
-        };
         let score =
             |at: &[f64]| self.member_loop(params, at).map_or(f64::NAN, |found| found.1.spectral_abscissa_per_s());
-        let top = maximise(&axes, &options, score)?;
+        let top = maximise(&axes, options, score)?;
         if top.value.is_nan() || top.value <= 0.0 {
             return Ok(None);
         }

@@ -8,7 +8,7 @@
 //! sampled      M_h (dq⁺ - dq)/h = -G e - D dq + v     e⁺ = e + h dq⁺      controller: F, G of each joint
 //! ```
 //!
-//! The sampled loop is [`crate::simulate`]'s own step: v is the torque u~⁺ of this sample (no delay) or of k samples ago, and `M_h = M + h diag c`
+//! The sampled loop is [`simulate`](mod@crate::simulate)'s own step: v is the torque u~⁺ of this sample (no delay) or of k samples ago, and `M_h = M + h diag c`
 //! carries the implicit Coulomb friction of slope c. Without Coulomb friction `M_h = M`.
 //!
 //! | symbol | blocks of N, in this order | unit |

@@ -245,6 +245,7 @@ mod tests {
         assert_eq!(segment.settling_time_s[0], None);
         assert_eq!(segment.slowest_settling_time_s(), None);
         let settled = measured(3.0);
-        assert_eq!(settled.slowest_settling_time_s(), settled.settling_time_s[0].max(settled.settling_time_s[1]));
+        let slowest = settled.settling_time_s.iter().flatten().copied().fold(0.0, f64::max);
+        assert_eq!(settled.slowest_settling_time_s(), Some(slowest));
     }
 }

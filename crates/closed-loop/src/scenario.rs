@@ -39,6 +39,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::file::{FileError, KeyError, Problem, load, read_text};
 use crate::plant_box::PlantBox;
+use crate::task::{Interval, Load, Task, TaskPayload, TaskPush, TaskSegment};
 
 /// The schema version of scenario files.
 pub const SCENARIO_SCHEMA: i64 = 1;
@@ -259,7 +260,7 @@ impl Scenario {
             self.list(&format!("segments[{index}].goal_rad"), &segment.goal_rad)?;
             let key = format!("segments[{index}].duration_s");
             let steps = segment.duration_s / self.step_s;
-            if !(steps >= 1.0 && steps <= MOST_STEPS) {
+            if !(1.0..=MOST_STEPS).contains(&steps) {
                 return Err(KeyError::out_of_range(&key, segment.duration_s, "between one and 1e9 steps of `step_s`"));
             }
         }
@@ -381,79 +382,6 @@ fn finite(key: &str, values: &[f64]) -> Result<(), KeyError> {
     }
 }
 
-/// Steps `from <= k < until`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Interval {
-    /// First step inside.
-    pub from: u64,
-    /// First step behind.
-    pub until: u64,
-}
-
-impl Interval {
-    /// Whether step `k` lies inside.
-    pub fn contains(&self, k: u64) -> bool {
-        self.from <= k && k < self.until
-    }
-}
-
-/// A goal and the number of steps it stands.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TaskSegment<const N: usize> {
-    /// The goal, rad.
-    pub goal: Joints<N>,
-    /// Steps until the next goal.
-    pub steps: u64,
-}
-
-/// A load and when it is attached.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TaskPayload {
-    /// When it is attached.
-    pub during: Interval,
-    /// The load.
-    pub payload: Payload,
-}
-
-/// What pushes the arm.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Load<const N: usize> {
-    /// Joint torques, N m.
-    Torque(Joints<N>),
-    /// A force at the flange's origin in world axes, N.
-    FlangeForce(Vector3<f64>),
-}
-
-/// A disturbance and when it acts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TaskPush<const N: usize> {
-    /// When it acts.
-    pub during: Interval,
-    /// What acts.
-    pub load: Load<N>,
-}
-
-/// A scenario bound to an arm of `N` joints.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Task<const N: usize> {
-    /// Sampling step, s.
-    pub step_s: f64,
-    /// Where the arm rests at the start, rad.
-    pub start: Joints<N>,
-    /// Goals in their order.
-    pub segments: Vec<TaskSegment<N>>,
-    /// Whether motor torques are limited.
-    pub torque_limits: bool,
-    /// How the plant is integrated.
-    pub integrator: Integrator,
-    /// Sensor noise.
-    pub noise: Noise,
-    /// Loads.
-    pub payloads: Vec<TaskPayload>,
-    /// Disturbances.
-    pub pushes: Vec<TaskPush<N>>,
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -478,10 +406,8 @@ mod tests {
             let scenario = Scenario::parse(Path::new(name), text).unwrap();
             assert_eq!(scenario.name, name);
             let task = scenario.bind::<7>(&robot).unwrap();
-            assert_eq!(
-                task.segments.iter().map(|segment| segment.steps).sum::<u64>() as f64,
-                scenario.duration_s() * 1e3
-            );
+            let steps: u64 = task.segments.iter().map(|segment| segment.steps).sum();
+            assert_eq!(steps, (scenario.duration_s() * 1e3).round() as u64);
             for values in
                 std::iter::once(&scenario.start_rad).chain(scenario.segments.iter().map(|goal| &goal.goal_rad))
             {

@@ -40,7 +40,8 @@ use rand_chacha::rand_core::{RngCore, SeedableRng};
 
 use crate::metrics::{Contribution, Meter, Metrics};
 use crate::plant_box::{PlantError, PlantSetting};
-use crate::scenario::{Integrator, Load, Method, Task};
+use crate::scenario::{Integrator, Method};
+use crate::task::{Interval, Load, Task};
 
 /// The longest actuation delay, samples.
 pub const MAX_DELAY_SAMPLES: usize = 16;
@@ -234,7 +235,7 @@ impl<'a, const N: usize, C: Controller<N>> Simulation<'a, N, C> {
 
     /// Attaches and releases loads whose time has come.
     fn change_loads(&mut self) {
-        let changes = |during: &crate::scenario::Interval| during.from == self.step || during.until == self.step;
+        let changes = |during: &Interval| during.from == self.step || during.until == self.step;
         if self.task.payloads.iter().any(|load| changes(&load.during)) {
             self.model = self.plant.model.clone();
             for load in self.task.payloads.iter().filter(|load| load.during.contains(self.step)) {

@@ -56,7 +56,7 @@ impl<const N: usize, D, H> Trajectory<N, D, H> {
 
 impl<const N: usize, S, D, H: FnMut(&Sample<'_, N, S>) -> D> Recorder<N, S> for Trajectory<N, D, H> {
     fn sample(&mut self, sample: &Sample<'_, N, S>) {
-        if sample.step % self.every == 0 {
+        if sample.step.is_multiple_of(self.every) {
             let (t_s, q, dq, goal, tau) = (sample.t_s, sample.at.q, sample.at.dq, sample.goal, sample.tau);
             self.rows.push(Row { t_s, q, dq, goal, tau, diagnostics: (self.hook)(sample) });
         }

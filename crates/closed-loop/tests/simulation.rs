@@ -228,20 +228,15 @@ fn noise_has_its_deviation_and_its_seed() {
     };
     let one = noise(7, 0);
     let count = (one.len() * 7) as f64;
-    let moments = |of: &dyn Fn(&(Joints<7>, Joints<7>)) -> Joints<7>| {
+    let moments = |of: fn(&(Joints<7>, Joints<7>)) -> Joints<7>| {
         let mean = one.iter().map(|pair| of(pair).sum()).sum::<f64>() / count;
         let square = one.iter().map(|pair| of(pair).norm_squared()).sum::<f64>() / count;
         (mean, square.sqrt())
     };
     // 35,000 numbers: the mean within 5 sigma of zero, the deviation within 2 %.
-    for (of, deviation) in
-        [(&(|pair: &(Joints<7>, Joints<7>)| pair.0) as &dyn Fn(&_) -> _, 1e-3), (&|pair| pair.1, 0.02)]
-    {
-        let (mean, measured) = moments(of);
-        assert!(
-            mean.abs() < 5.0 * deviation / count.sqrt() && (measured / deviation - 1.0).abs() < 0.02,
-            "{mean} {measured}"
-        );
+    for ((mean, measured), deviation) in [(moments(|pair| pair.0), 1e-3), (moments(|pair| pair.1), 0.02)] {
+        assert!(mean.abs() < 5.0 * deviation / count.sqrt(), "mean {mean}");
+        assert!((measured / deviation - 1.0).abs() < 0.02, "deviation {measured}");
     }
     assert_eq!(one, noise(7, 0));
     assert_ne!(one, noise(7, 1));

@@ -49,7 +49,7 @@ pub struct Linearisation<const N: usize, T: Real = f64> {
     pub ddq_dtau: JointMatrix<N, T>,
 }
 
-/// Half the derivative of a body's bias wrench with respect to the velocity, doubled: see the module's text.
+/// `2 B` of a body or a subtree, as in the module's text: a 3x3 block for the moment and `-2 f` for the force.
 #[derive(Clone, Copy)]
 struct Bias<T: Real> {
     block: Matrix3<T>,

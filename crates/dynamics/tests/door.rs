@@ -2,6 +2,8 @@
 
 use certune_dynamics::{Frame, GRAVITY_M_PER_S2, Inertia, Link, Model, Payload, Robot, RobotError};
 
+type Change<'a> = &'a dyn Fn(&mut Link);
+
 /// The Panda with its fourth link changed.
 fn altered(change: impl Fn(&mut Link)) -> Result<Robot, RobotError> {
     let mut links = Robot::panda().links().to_vec();
@@ -18,7 +20,7 @@ fn message(change: impl Fn(&mut Link)) -> String {
 
 #[test]
 fn every_bad_number_is_named() {
-    let cases: [(&str, &dyn Fn(&mut Link)); 20] = [
+    let cases: [(&str, Change); 20] = [
         ("the mass is 0 kg", &|l| l.inertia.mass_kg = 0.0),
         ("the mass is -1 kg", &|l| l.inertia.mass_kg = -1.0),
         ("the mass is NaN kg", &|l| l.inertia.mass_kg = f64::NAN),

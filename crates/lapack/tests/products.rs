@@ -1,5 +1,7 @@
 //! BLAS: every option of every product against naive sums, and what must not be touched.
 
+#![expect(clippy::float_cmp, reason = "what must not be touched, and sums of small integers, are exact")]
+
 mod common;
 
 use common::{Matrix, PADDING, Real, numbers};

@@ -220,7 +220,6 @@ proptest! {
 }
 
 #[test]
-#[expect(clippy::float_cmp, reason = "these values are exact")]
 fn matrices_with_exact_answers() {
     for n in [1, 2, 3, 4, 17, 42] {
         let zero = Matrix::<f64>::filled(n, n, 0, 0.0);
@@ -241,7 +240,7 @@ fn matrices_with_exact_answers() {
 #[test]
 fn known_spectra_of_textbook_matrices() {
     // Second difference: 2 - 2 cos(k pi / (n + 1)).
-    for n in [5, 42, 150] {
+    for n in [5, 42, 90] {
         let a = Matrix::<f64>::from_fn(n, n, 0, |i, j| match i.abs_diff(j) {
             0 => 2.0,
             1 => -1.0,
@@ -285,13 +284,16 @@ fn numbers_near_both_ends_of_the_range() {
 
 #[test]
 fn orders_beyond_the_blocks_of_the_kernels() {
-    for n in [42, 64, 65, 129, 160] {
+    for n in [42, 64, 65, 129] {
         let entry = |i: usize, j: usize| ((i * i * j + j * j * i) as f64).sin();
         check_eigen(&Matrix::<f64>::from_fn(n, n, 0, entry), 1);
+        check_eigen(&Matrix::<f32>::from_fn(n, n, 0, entry), 0);
         check_svd(&Matrix::<f64>::from_fn(n, n, 0, entry), (b'S', b'S'), false, 0);
+    }
+    for n in [42, 65] {
+        let entry = |i: usize, j: usize| ((i * i * j + j * j * i) as f64).sin();
         check_svd(&Matrix::<f64>::from_fn(n, 2 * n + 1, 0, entry), (b'S', b'S'), true, 0);
         check_svd(&Matrix::<f64>::from_fn(2 * n, n, 0, entry), (b'A', b'A'), false, 0);
-        check_eigen(&Matrix::<f32>::from_fn(n, n, 0, entry), 0);
     }
 }
 

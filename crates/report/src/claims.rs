@@ -67,13 +67,19 @@ pub(crate) fn in_one_line(certificate: &CertificateRecord) -> (Tone, String) {
         return (Tone::Open, "no claim was examined".to_owned());
     }
     if refused > 0 {
-        return (Tone::Failed, format!("{} refused, with a counterexample", of(refused, claims.len())));
+        let shown = claims.iter().any(|claim| claim.verdict == Verdict::Refused && !claim.counterexample.is_empty());
+        let how = if shown { ", with a counterexample" } else { "" };
+        return (Tone::Failed, format!("{} refused{how}", of(refused, claims.len())));
     }
     if open > 0 {
         return (Tone::Open, format!("{} not proved and not refuted", of(open, claims.len())));
     }
     let weakest = claims.iter().map(worth).min().unwrap_or(Grade::Sampled);
-    let all = if held == 1 { "the claim".to_owned() } else { format!("all {held} claims") };
+    let all = match held {
+        1 => "the claim".to_owned(),
+        2 => "both claims".to_owned(),
+        _ => format!("all {held} claims"),
+    };
     match weakest {
         Grade::Proved => (Tone::Exact, format!("{all} proved")),
         Grade::Conditional => (Tone::Conditional, "conditional: holds if the sampled constants hold".to_owned()),

@@ -57,6 +57,11 @@ fn page(record: &TuningReport) -> String {
     html
 }
 
+/// Tests cannot see: the page stays in `target/tmp` for whoever can.
+fn keep_for_a_look(html: &str, name: &str) {
+    std::fs::write(format!("{}/{name}.html", env!("CARGO_TARGET_TMPDIR")), html).unwrap();
+}
+
 #[test]
 fn the_checker_of_this_file_finds_broken_pages() {
     assert_eq!(balanced("<p><b>a</b><br><i/></p>"), Ok(4));
@@ -68,8 +73,7 @@ fn the_checker_of_this_file_finds_broken_pages() {
 #[test]
 fn the_page_is_complete_small_and_loads_nothing() {
     let html = page(&synthetic::record());
-    // For a look in a browser.
-    std::fs::write(concat!(env!("CARGO_TARGET_TMPDIR"), "/report.html"), &html).unwrap();
+    keep_for_a_look(&html, "report");
     for section in SECTIONS {
         assert!(html.contains(&format!("<section id=\"{section}\"")), "{section}");
         assert!(section == "answer" || html.contains(&format!("href=\"#{section}\"")), "{section}");
@@ -121,13 +125,13 @@ fn a_proof_is_called_one_only_when_every_link_is() {
         claim.assumptions.iter_mut().for_each(|assumption| assumption.grade = Grade::Proved);
     }
     let html = page(&record);
-    assert!(html.contains("all 2 claims proved") && html.contains(">Proved</span>"));
+    assert!(html.contains("both claims proved") && html.contains(">Proved</span>"));
 
     record.certificate.claims[0].assumptions[1].grade = Grade::Sampled;
     record.certificate.claims[1].assumptions[2].grade = Grade::Conditional;
     let html = page(&record);
     assert!(!html.to_lowercase().contains("proved"));
-    assert!(html.contains("all 2 claims seen to hold in samples only"));
+    assert!(html.contains("both claims seen to hold in samples only"));
 }
 
 #[test]
@@ -201,11 +205,14 @@ fn missing_and_diverged_numbers_leave_gaps_not_nonsense() {
     record.sensitivity[0].ratio_at_minus_10_percent = None;
     record.sensitivity[1].ratio_at_plus_10_percent = Some(f64::INFINITY);
     record.certificate.claims[0].margins[0].value = None;
+    record.certificate.claims[0].verdict = Verdict::Refused;
+    record.certificate.claims[0].counterexample = vec!["at q = 0: eigenvalue 0.31 ± 2.2i /s".to_owned()];
     let html = page(&record);
+    keep_for_a_look(&html, "report-diverged");
     let words = words(&html);
     assert!(!words.contains("NaN") && !words.contains(" inf"), "a raw float reached the reader");
     for expected in [
-        "the published gains do not settle",
+        "settle every move in 3.10\u{a0}s; the published gains do not",
         "ran away after 10.2&nbsp;s",
         ">never</td>",
         ">diverged</td>",
@@ -275,6 +282,59 @@ fn a_record_travels_through_json_and_refuses_unknown_keys() {
     let text = serde_json::to_string(&record).unwrap();
     let back: TuningReport = serde_json::from_str(&text).unwrap();
     assert!(back.response.runs.tuned.q_rad[2][5].is_nan());
+}
+
+#[test]
+fn a_region_without_a_radius_is_said_to_cover_nothing() {
+    let mut record = synthetic::record();
+    record.certificate.region.as_mut().unwrap().radius_rad = None;
+    let html = page(&record);
+    assert!(html.contains("No starting error is certified for the nonlinear arm"));
+    assert!(html.contains("Certified radius (none) against the moves") && html.contains("covers 0 of 5 moves"));
+}
+
+#[test]
+fn every_sentinel_colour_has_a_rule() {
+    let html = page(&synthetic::record());
+    let (style, body) = html.split_once("</style>").unwrap();
+    for attribute in ["fill", "stroke"] {
+        let open = format!(" {attribute}=\"#");
+        let colours: std::collections::BTreeSet<_> = body.split(&open).skip(1).map(|rest| &rest[..6]).collect();
+        assert!(colours.len() > 4, "{colours:?}");
+        for colour in colours {
+            assert!(style.contains(&format!("svg [{attribute}=\"#{colour}\"]")), "{attribute} #{colour}");
+        }
+    }
+}
+
+/// Relative luminance of `#rrggbb`, WCAG 2.
+fn luminance(hex: &str) -> f64 {
+    let channel = |at: usize| {
+        let level = f64::from(u8::from_str_radix(&hex[at..at + 2], 16).unwrap()) / 255.0;
+        if level <= 0.040_45 { level / 12.92 } else { ((level + 0.055) / 1.055).powf(2.4) }
+    };
+    0.2126 * channel(0) + 0.7152 * channel(2) + 0.0722 * channel(4)
+}
+
+#[test]
+fn words_and_curves_stand_out_in_light_and_dark() {
+    let html = page(&synthetic::record());
+    let themes: Vec<&str> = html.split(":root {").skip(1).map(|rest| rest.split_once('}').unwrap().0).collect();
+    assert_eq!(themes.len(), 2);
+    for theme in themes {
+        let colour = |name: &str| luminance(&theme.split_once(&format!("--{name}: #")).unwrap().1[..6]);
+        let contrast = |name: &str, ground: &str| {
+            let (a, b) = (colour(name), colour(ground));
+            (a.max(b) + 0.05) / (a.min(b) + 0.05)
+        };
+        for name in ["ink", "muted", "axis", "tuned-ink", "published-ink", "certified-ink", "outside-ink", "open-ink"] {
+            assert!(contrast(name, "paper") >= 4.5, "{name}: {:.2}", contrast(name, "paper"));
+        }
+        for name in ["tuned", "published", "goal", "certified", "outside", "candidate"] {
+            assert!(contrast(name, "paper") >= 3.0, "{name}: {:.2}", contrast(name, "paper"));
+        }
+        assert!(contrast("ink", "raised") >= 7.0);
+    }
 }
 
 #[test]

@@ -371,3 +371,19 @@ macro_rules! export {
 
 export!(f32: sgemm_ sgemv_ ssymv_ ssyrk_ ssyr2k_);
 export!(f64: dgemm_ dgemv_ dsymv_ dsyrk_ dsyr2k_);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_internal_failure_fills_the_result_with_nan() {
+        let region = Region { rows: 2, cols: 2, ld: 3, part: Part::Upper };
+        let mut c = [1.0_f64; 6];
+        let result = guarded(|| -> Mat<f64> { panic!("on purpose") });
+        // SAFETY: `c` is as large as the region says.
+        unsafe { deliver(c.as_mut_ptr(), region, result) };
+        let written: Vec<usize> = (0..6).filter(|&i| c[i].is_nan()).collect();
+        assert_eq!(written, [0, 3, 4], "the named triangle, and nothing else");
+    }
+}

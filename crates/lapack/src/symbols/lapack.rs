@@ -452,3 +452,37 @@ macro_rules! export {
 
 export!(f32: spotrf_ spotrs_ sgesv_ ssyevr_ sgesdd_ sgesvd_);
 export!(f64: dpotrf_ dpotrs_ dgesv_ dsyevr_ dgesdd_ dgesvd_);
+
+#[cfg(test)]
+mod tests {
+    use core::ptr::{null, null_mut};
+
+    use super::*;
+
+    #[test]
+    fn a_panic_stops_at_the_boundary_and_becomes_an_info() {
+        let mut info = 0;
+        // SAFETY: `info` is valid.
+        unsafe { answer(&mut info, || panic!("on purpose")) };
+        assert_eq!(info, INTERNAL);
+        // SAFETY: a null `info` is allowed.
+        unsafe { answer(null_mut(), || Ok(())) };
+    }
+
+    #[test]
+    fn null_pointers_are_illegal_arguments() {
+        let (uplo, n, mut info) = (b'U' as c_char, 2, 0);
+        let mut a = [1.0; 4];
+        // SAFETY: every pointer is null or valid.
+        unsafe {
+            dpotrf_(null(), &n, a.as_mut_ptr(), &n, &mut info);
+            assert_eq!(info, -1);
+            dpotrf_(&uplo, null(), a.as_mut_ptr(), &n, &mut info);
+            assert_eq!(info, -2);
+            dpotrf_(&uplo, &n, null_mut(), &n, &mut info);
+            assert_eq!(info, -3);
+            dpotrf_(&uplo, &n, a.as_mut_ptr(), null(), &mut info);
+            assert_eq!(info, -4);
+        }
+    }
+}

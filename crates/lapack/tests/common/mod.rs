@@ -1,6 +1,7 @@
 //! Both precisions behind one trait, called through the declarations that clarabel uses, and naive references in `f64`.
 #![allow(dead_code, clippy::allow_attributes, reason = "each test file uses a part of this one")]
 #![expect(unsafe_code, reason = "Fortran symbols are called by pointer")]
+#![expect(clippy::too_many_arguments, reason = "the lists are those of BLAS and LAPACK")]
 
 use std::fmt::Debug;
 use std::ops::Range;

@@ -48,7 +48,7 @@ impl Axis {
         let (lower, upper) = (lower / margin, upper * margin);
         let (first, last) = (lower.log10().floor() as i32, upper.log10().ceil() as i32);
         let stride = ((last - first) / 6 + 1) as usize;
-        let plain = first >= -3 && last <= 4;
+        let plain = lower.log10().ceil() >= -3.0 && upper.log10().floor() <= 4.0;
         let fine: &[f64] = match (upper / lower).log10() {
             decades if decades < 1.2 => &[1.0, 2.0, 3.0, 5.0, 7.0],
             decades if decades < 2.2 => &[1.0, 3.0],
@@ -106,10 +106,11 @@ pub(crate) fn row_at(index: usize) -> f64 {
     -(index as f64)
 }
 
-/// The smallest of 1, 2, 5 times a power of ten that is not below `rough`.
+/// The smallest of 1, 2, 5 times a power of ten that is not much below `rough`.
 fn nice_step(rough: f64) -> f64 {
-    let power = 10_f64.powf(rough.log10().floor());
-    [1.0, 2.0, 5.0].into_iter().map(|digit| digit * power).find(|step| *step >= rough * 0.999).unwrap_or(10.0 * power)
+    let least = 0.7 * rough;
+    let power = 10_f64.powf(least.log10().floor());
+    [1.0, 2.0, 5.0].into_iter().map(|digit| digit * power).find(|step| *step >= 0.999 * least).unwrap_or(10.0 * power)
 }
 
 #[cfg(test)]

@@ -96,7 +96,11 @@ impl Plot {
         self.draw(&mut raw).map_err(|source| ReportError::Draw { figure: self.title.clone(), source })?;
         // The library's own opening tag fixes the size in pixels and names a namespace that HTML does not need.
         let body = raw.split_once('>').map_or(raw.as_str(), |(_, body)| body).trim_start();
-        let body = body.replace(" opacity=\"1\"", "").replace(" font-family=\"sans-serif\"", "").replace(">\n", ">");
+        let body = body
+            .replace(" opacity=\"1\"", "")
+            .replace(" font-family=\"sans-serif\"", "")
+            .replace(" stroke=\"none\" stroke-width=\"1\"", "")
+            .replace(">\n", ">");
         let (width, height) = (units(self.size.0), units(self.size.1));
         let (title, description) = (escaped(&self.title), escaped(&self.description));
         Ok(format!(

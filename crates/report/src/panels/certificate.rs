@@ -105,7 +105,7 @@ pub(super) fn region(certificate: &CertificateRecord) -> Result<Option<String>, 
         size: (HALF.0, 68.0 + 28.0 * region.steps.len() as f64),
         x: Axis::linear("size of the move, norm over the joints (rad)", (0.0, 1.05 * longest), 4),
         y: Axis::rows(region.steps.iter().map(|step| step.label.clone())),
-        right: 84.0,
+        right: 92.0,
         marks,
     }
     .svg()

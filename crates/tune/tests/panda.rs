@@ -1,0 +1,153 @@
+//! The search on the arm itself: what the filter rejects runs away, what is found is better on plants it never met, threads do not matter.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use certune_closed_loop::{GainsFile, Scenario};
+use certune_control::aic::AicParams;
+use certune_dynamics::Robot;
+use certune_tune::filter::DEFAULT_SAMPLES;
+use certune_tune::{
+    AicObjective, Batch, BatchError, Bench, Gain, Gains, Judge, Method, Objective, Outcome, Question, SearchSettings,
+    Space, tune,
+};
+
+const SCENARIO: &str = include_str!("../../../tuning/scenarios/pick-and-place.toml");
+const SPACE: &str = include_str!("../../../tuning/spaces/panda-aic.toml");
+const PRESET: &str = include_str!("../../../tuning/presets/pezzato2020-simulation.toml");
+const PER_JOINT_PRESET: &str = include_str!("../../../tuning/presets/pezzato2020-robot.toml");
+
+/// The default task, its first `goals` goals of `duration_s` each.
+fn scenario(goals: usize, duration_s: f64) -> Scenario {
+    let mut scenario = Scenario::parse(Path::new("pick-and-place.toml"), SCENARIO).expect("a valid scenario");
+    scenario.segments.truncate(goals);
+    for segment in &mut scenario.segments {
+        segment.duration_s = duration_s;
+    }
+    scenario
+}
+
+fn preset(text: &str) -> Result<Gains, certune_tune::NotShared> {
+    let file = GainsFile::parse(Path::new("preset.toml"), text).expect("a valid preset");
+    match file.gains {
+        certune_closed_loop::Gains::Aic(table) => Gains::from_table(&table),
+        certune_closed_loop::Gains::Mrac(_) => unreachable!("the preset is of the other controller"),
+    }
+}
+
+fn published() -> Gains {
+    preset(PRESET).expect("gains that all joints share")
+}
+
+#[test]
+fn the_published_gains_settle_as_the_literature_says() {
+    let batch = Batch::<7>::held_out(&Robot::panda(), &scenario(1, 6.0), 1, 2).unwrap();
+    let verdict = batch.judge(&published());
+    for plant in &verdict.plants {
+        let settling_time_s = plant.figures.settling_time_s.unwrap();
+        assert!((3.9..4.3).contains(&settling_time_s), "{settling_time_s}");
+    }
+    // A first-order lag that settles to 2 % in 4.05 s has a time constant of 1.04 s; jitter adds some hundredths.
+    let cost_s = verdict.outcome.cost_s().unwrap();
+    assert!((1.0..1.2).contains(&cost_s), "{cost_s}");
+}
+
+#[test]
+fn what_the_filter_rejects_runs_away_or_never_settles() {
+    let robot = Robot::panda();
+    let scenario = scenario(1, 6.0);
+    let objective = AicObjective::<7>::new(&robot, &scenario, 1, 2, DEFAULT_SAMPLES).unwrap();
+    assert!(matches!(objective.evaluate(&published()), Outcome::Simulated { .. }));
+    // The published reference behaviour: sigma_dq = 5 runs away.
+    let restless = published().with(Gain::SigmaDq, 5.0);
+    assert!(matches!(objective.evaluate(&restless), Outcome::Unstable { .. }), "{:?}", objective.evaluate(&restless));
+    let verdict = objective.batch().judge(&restless);
+    let settles = |figures: &certune_tune::Figures| figures.settling_time_s.is_some();
+    assert!(
+        verdict.plants.iter().all(|plant| plant.outcome.cost_s().is_none() || !settles(&plant.figures)),
+        "{verdict:?}"
+    );
+}
+
+#[test]
+fn the_filter_sees_the_slowest_mode_and_an_euler_step_that_is_too_long() {
+    let robot = Robot::panda();
+    let objective = AicObjective::<7>::new(&robot, &scenario(1, 6.0), 1, 1, DEFAULT_SAMPLES).unwrap();
+    let growth_per_s = |gains: &Gains| {
+        let params = AicParams::new(&gains.on_every_joint(), 1e-3).unwrap();
+        objective.filter().growth_per_s(&params).get()
+    };
+    // The slowest mode of the published gains is the reference's, about 1 /s.
+    assert!((-1.2..-0.8).contains(&growth_per_s(&published())), "{}", growth_per_s(&published()));
+    assert!(growth_per_s(&published().with(Gain::KappaMu, 2000.0)) > 0.0, "an Euler step of 2 leak rates is unstable");
+    assert_eq!(objective.filter().len(), DEFAULT_SAMPLES);
+}
+
+#[test]
+fn gains_that_make_no_controller_are_the_worst_outcome() {
+    let objective = AicObjective::<7>::new(&Robot::panda(), &scenario(1, 0.1), 1, 1, 3).unwrap();
+    let none = objective.evaluate(&published().with(Gain::SigmaMu, 0.0));
+    assert!(matches!(none, Outcome::Diverged { at_s } if at_s.get() == 0.0), "{none:?}");
+}
+
+#[test]
+fn batch_and_held_out_plants_are_disjoint_and_a_batch_is_never_empty() {
+    let robot = Robot::panda();
+    let scenario = scenario(1, 0.1);
+    let seen = Batch::<7>::for_search(&robot, &scenario, 1, 20).unwrap();
+    let unseen = Batch::<7>::held_out(&robot, &scenario, 1, 20).unwrap();
+    assert!(
+        seen.plants()
+            .iter()
+            .all(|(index, plant)| unseen.plants().iter().all(|(other, twin)| index != other && plant != twin))
+    );
+    assert!(matches!(Batch::<7>::for_search(&robot, &scenario, 1, 0), Err(BatchError::NoPlants)));
+    assert!(Batch::<6>::for_search(&robot, &scenario, 1, 1).is_err());
+}
+
+#[test]
+fn gains_per_joint_are_no_start_and_the_error_names_the_gain() {
+    let error = preset(PER_JOINT_PRESET).unwrap_err();
+    assert_eq!(error.gain, Gain::SigmaQ);
+    assert!(error.to_string().contains("sigma_q"), "{error}");
+}
+
+/// A small tuning run: one goal, two plants.
+fn run(method: Method, threads: usize) -> certune_tune::RunRecord {
+    let robot = Robot::panda();
+    let scenario = scenario(1, 4.0);
+    let space = Space::parse(Path::new("panda-aic.toml"), SPACE).expect("the shipped space");
+    let question = Question {
+        robot: robot.name().to_owned(),
+        robot_sha256: robot.sha256(),
+        scenario: scenario.name.clone(),
+        versions: BTreeMap::new(),
+        search: SearchSettings { particles: 6, ..SearchSettings::new(method, 24, 5) },
+        batch_plants: 2,
+        held_out_plants: 3,
+        certification_attempts: 3,
+    };
+    let objective = AicObjective::<7>::new(&robot, &scenario, 5, question.batch_plants, 6).expect("plants that fit");
+    let judge = Batch::<7>::held_out(&robot, &scenario, 5, question.held_out_plants).expect("plants that fit");
+    let bench = Bench { objective: &objective, judge: &judge, progress: &() };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    let certify = |_: &Gains| Ok::<_, &str>(());
+    pool.install(|| tune(question, &space, Some(&published()), bench, certify)).expect("a valid run").record
+}
+
+#[test]
+fn nelder_mead_beats_the_published_gains_on_plants_it_never_met_and_threads_do_not_matter() {
+    let one = run(Method::NelderMead, 1);
+    let (start, tuned) = (one.held_out.start.as_ref().unwrap(), one.held_out.tuned.as_ref().unwrap());
+    assert!(tuned.outcome.cost_s().unwrap() < 0.97 * start.outcome.cost_s().unwrap(), "{start:?} {tuned:?}");
+    let text = |record| serde_json::to_string_pretty(record).unwrap();
+    assert_eq!(text(&one), text(&run(Method::NelderMead, 2)));
+}
+
+#[test]
+fn a_cold_swarm_gives_the_same_record_for_any_number_of_threads() {
+    let text = |threads| serde_json::to_string_pretty(&run(Method::ParticleSwarm, threads)).unwrap();
+    let one = text(1);
+    assert_eq!(one, text(2));
+    assert_eq!(one, text(4));
+}

@@ -1,0 +1,383 @@
+//! The command line's shape.
+//!
+//! `tune` is the default command: its options also stand at the top level. Usage errors exit with 1, since 2 means "not certified".
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::error::ErrorKind;
+use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
+
+use crate::commands::{certify, inspect, lists, report, simulate, tune, verify};
+use crate::error::Error;
+use crate::output;
+
+const AFTER_HELP: &str = "\
+Examples:
+  autotune --robot panda                            tune, certify and report, in about a minute
+  autotune certify --robot panda --gains pezzato2020-simulation
+  autotune verify runs/panda-aic-1/certificate.json
+  autotune presets                                  what --gains knows by name
+
+Exit codes: 0 every claim holds (conditional ones included), 2 a claim is refused, not proved or rejected, 1 usage, an unreadable file or any other error.";
+
+/// Tune the gains of a robot-arm controller, prove that the result is stable, and report.
+#[derive(Debug, Parser)]
+#[command(name = "autotune", version, after_help = AFTER_HELP, subcommand_negates_reqs = true, arg_required_else_help = true)]
+#[command(disable_help_subcommand = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    #[command(flatten)]
+    pub tune: Option<TuneArgs>,
+    #[command(flatten)]
+    pub shared: Context,
+}
+
+/// Options of every command.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Context {
+    /// Print the result as JSON on stdout
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Say more on stderr
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Search for gains, certify the best and write a report (the default command)
+    Tune(TuneArgs),
+    /// Prove that an arm with given gains is stable, or say why not
+    Certify(CertifyArgs),
+    /// Check certificates again, in exact arithmetic, from the files alone
+    Verify(VerifyArgs),
+    /// Run a scenario and print its figures
+    Simulate(SimulateArgs),
+    /// Print the arm's dynamics at one state
+    Inspect(InspectArgs),
+    /// Rebuild report.html from a run's folder
+    Report(ReportArgs),
+    /// List the built-in robots
+    Robots,
+    /// List the built-in gain presets
+    Presets,
+    /// List the built-in scenarios
+    Scenarios,
+}
+
+#[derive(Clone, Debug, Args)]
+pub struct RobotArgs {
+    /// Built-in robot (see `autotune robots`) or a URDF file
+    #[arg(long, value_name = "NAME|FILE.urdf")]
+    pub robot: String,
+    /// Last link of the arm, for a URDF file that branches
+    #[arg(long, value_name = "LINK")]
+    pub tip: Option<String>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ControllerName {
+    /// Active inference
+    Aic,
+    /// Model reference adaptive control: can be simulated, not tuned yet
+    Mrac,
+}
+
+#[derive(Debug, Args)]
+pub struct TuneArgs {
+    // Not a flattened `RobotArgs`: clap sees an optional group only in its own arguments.
+    /// Built-in robot (see `autotune robots`) or a URDF file
+    #[arg(long, value_name = "NAME|FILE.urdf")]
+    pub robot: String,
+    /// Last link of the arm, for a URDF file that branches
+    #[arg(long, value_name = "LINK")]
+    pub tip: Option<String>,
+    /// Controller to tune [default: aic]
+    #[arg(long, value_name = "NAME")]
+    pub controller: Option<ControllerName>,
+    /// Search space: a TOML file [default: the built-in panda-aic]
+    #[arg(long, value_name = "FILE")]
+    pub space: Option<String>,
+    /// Scenario by name or TOML file [default: pick-and-place; for a URDF file a generic one]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub scenario: Option<String>,
+    /// Candidates to evaluate [default: 150]
+    #[arg(long, value_name = "N")]
+    pub budget: Option<usize>,
+    /// Seed of every random draw [default: 1]
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Threads; the result does not depend on it [default: one per core]
+    #[arg(long, value_name = "T", value_parser = threads)]
+    pub threads: Option<usize>,
+    /// Folder for the results [default: runs/ROBOT-CONTROLLER-SEED]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ClaimName {
+    /// Every linearised loop of the family decays at a rate
+    Exponential,
+    /// The nonlinear arm converges from every start in a ball
+    Region,
+    /// Both
+    All,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    On,
+    Off,
+}
+
+#[derive(Debug, Args)]
+pub struct CertifyArgs {
+    #[command(flatten)]
+    pub robot: RobotArgs,
+    /// Gains: a preset (see `autotune presets`) or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub gains: String,
+    /// Claim to examine
+    #[arg(long, value_enum, default_value_t = ClaimName::All)]
+    pub claim: ClaimName,
+    /// Claim it for every plant of this scenario's plant box, instead of the five options below
+    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["gravity_compensation", "friction", "payload", "mass_uncertainty", "rotor_inertia"])]
+    pub scenario: Option<String>,
+    /// Whether the robot compensates its own gravity [default: off]
+    #[arg(long, value_name = "on|off", hide_possible_values = true)]
+    pub gravity_compensation: Option<Switch>,
+    /// Viscous friction of every joint, N m s/rad [default: the robot's own, 0 for the built-in ones]
+    #[arg(long, value_name = "X|MIN..MAX", value_parser = interval, allow_hyphen_values = true)]
+    pub friction: Option<Interval>,
+    /// Payload from 0 to this mass, kg; a point held at the grasp point [default: 0]
+    #[arg(long, value_name = "KG", value_parser = non_negative, allow_hyphen_values = true)]
+    pub payload: Option<f64>,
+    /// Link masses differ from nominal by up to this share, 0.2 for ±20 % [default: 0]
+    #[arg(long, value_name = "SHARE", value_parser = share, allow_hyphen_values = true)]
+    pub mass_uncertainty: Option<f64>,
+    /// Rotor inertia of every joint, kg m² [default: the robot's own]
+    #[arg(long, value_name = "X|MIN..MAX", value_parser = interval, allow_hyphen_values = true)]
+    pub rotor_inertia: Option<Interval>,
+    /// Write the certificate to this file
+    #[arg(long, value_name = "FILE")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct VerifyArgs {
+    /// Certificate files
+    #[arg(required = true, value_name = "CERTIFICATE.json")]
+    pub files: Vec<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    #[command(flatten)]
+    pub robot: RobotArgs,
+    /// Gains: a preset (see `autotune presets`) or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub gains: String,
+    /// Scenario by name or TOML file [default: pick-and-place; for a URDF file a generic one]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub scenario: Option<String>,
+    /// Payload at the grasp point, kg [default: 0]
+    #[arg(long, value_name = "KG", value_parser = non_negative, allow_hyphen_values = true)]
+    pub payload: Option<f64>,
+    /// Viscous friction of every joint, N m s/rad [default: the robot's own, 0 for the built-in ones]
+    #[arg(long, value_name = "D", value_parser = non_negative, allow_hyphen_values = true)]
+    pub friction: Option<f64>,
+    /// Rotor inertia of every joint, kg m² [default: the robot's own]
+    #[arg(long, value_name = "I", value_parser = non_negative, allow_hyphen_values = true)]
+    pub rotor_inertia: Option<f64>,
+    /// Samples from a command to its torque [default: 0]
+    #[arg(long, value_name = "K")]
+    pub delay: Option<usize>,
+    /// Whether the robot compensates its own gravity [default: as the scenario says]
+    #[arg(long, value_name = "on|off", hide_possible_values = true)]
+    pub gravity_compensation: Option<Switch>,
+    /// Seed of the sensor noise, if the scenario has any [default: 1]
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Write positions, velocities, goals and torques to this file, one row each 10 ms
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct InspectArgs {
+    #[command(flatten)]
+    pub robot: RobotArgs,
+    /// Joint positions, rad, separated by commas
+    #[arg(long, value_name = "LIST", value_parser = numbers, allow_hyphen_values = true)]
+    pub q: Numbers,
+    /// Joint velocities, rad/s [default: zeros]
+    #[arg(long, value_name = "LIST", value_parser = numbers, allow_hyphen_values = true)]
+    pub dq: Option<Numbers>,
+    /// Joint torques, N m, for the acceleration [default: zeros]
+    #[arg(long, value_name = "LIST", value_parser = numbers, allow_hyphen_values = true)]
+    pub tau: Option<Numbers>,
+}
+
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Folder of a run
+    #[arg(value_name = "RUN_DIR")]
+    pub run_dir: PathBuf,
+    /// The URDF file of a run that was made with one
+    #[arg(long, value_name = "FILE.urdf")]
+    pub robot: Option<String>,
+    /// Its last link, if it was named
+    #[arg(long, value_name = "LINK", requires = "robot")]
+    pub tip: Option<String>,
+}
+
+/// A closed interval of numbers that are not negative.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval(pub [f64; 2]);
+
+/// A list of finite numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Numbers(pub Vec<f64>);
+
+fn finite(text: &str) -> Result<f64, String> {
+    let number: f64 = text.trim().parse().map_err(|_| format!("`{}` is not a number", text.trim()))?;
+    if number.is_finite() { Ok(number) } else { Err(format!("`{}` is not a finite number", text.trim())) }
+}
+
+fn non_negative(text: &str) -> Result<f64, String> {
+    finite(text)
+        .and_then(|number| if number >= 0.0 { Ok(number) } else { Err("expected a number, zero or above".to_owned()) })
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    non_negative(text).and_then(|number| {
+        if number < 1.0 { Ok(number) } else { Err("expected a share of at least 0 and below 1".to_owned()) }
+    })
+}
+
+fn interval(text: &str) -> Result<Interval, String> {
+    let Some((low, high)) = text.split_once("..") else {
+        return non_negative(text).map(|number| Interval([number, number]));
+    };
+    let (low, high) = (non_negative(low)?, non_negative(high)?);
+    if low <= high {
+        Ok(Interval([low, high]))
+    } else {
+        Err(format!("{low} is above {high}; write the smaller number first"))
+    }
+}
+
+fn numbers(text: &str) -> Result<Numbers, String> {
+    let entries = text.split(',').enumerate();
+    let numbers = entries.map(|(index, entry)| finite(entry).map_err(|error| format!("entry {}: {error}", index + 1)));
+    numbers.collect::<Result<_, _>>().map(Numbers)
+}
+
+fn threads(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("at least 1 thread is needed".to_owned()),
+        Ok(count) if count > 1024 => Err("at most 1024 threads are supported".to_owned()),
+        Ok(count) => Ok(count),
+        Err(_) => Err("expected a number of threads, 1 or more".to_owned()),
+    }
+}
+
+/// What a command that came to an answer says by its exit code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Exit {
+    /// Every claim holds, or none was made.
+    Holds,
+    /// A claim is refused, not proved or rejected.
+    NotCertified,
+    /// A file among several could not be read; it has been named.
+    Unreadable,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        match exit {
+            Exit::Holds => Self::SUCCESS,
+            Exit::NotCertified => Self::from(2),
+            Exit::Unreadable => Self::FAILURE,
+        }
+    }
+}
+
+/// Reads the arguments and runs the command.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let cli = match Cli::try_parse_from(arguments).and_then(without_mixture) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Only a closed stdout or stderr can keep the text from being printed.
+            let _ = error.print();
+            return if error.use_stderr() { ExitCode::FAILURE } else { ExitCode::SUCCESS };
+        }
+    };
+    match dispatch(cli) {
+        Ok(exit) => exit.into(),
+        Err(error) => {
+            output::say(&error.in_full());
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Options of `tune` before another command would be ignored silently.
+fn without_mixture(cli: Cli) -> Result<Cli, clap::Error> {
+    match (&cli.command, &cli.tune) {
+        (Some(_), Some(_)) => {
+            let message = "options of `tune` stand before another command; put every option behind the command's name";
+            Err(Cli::command().error(ErrorKind::ArgumentConflict, message))
+        }
+        (Some(_), None) | (None, Some(_)) => Ok(cli),
+        (None, None) => {
+            Err(Cli::command().error(ErrorKind::MissingRequiredArgument, "--robot <NAME|FILE.urdf> is needed"))
+        }
+    }
+}
+
+fn dispatch(cli: Cli) -> Result<Exit, Error> {
+    let context = cli.shared;
+    match (cli.command, cli.tune) {
+        (Some(Command::Tune(args)), _) | (None, Some(args)) => tune::run(&args, context),
+        (Some(Command::Certify(args)), _) => certify::run(&args, context),
+        (Some(Command::Verify(args)), _) => verify::run(&args, context),
+        (Some(Command::Simulate(args)), _) => simulate::run(&args, context),
+        (Some(Command::Inspect(args)), _) => inspect::run(&args, context),
+        (Some(Command::Report(args)), _) => report::run(&args, context),
+        (Some(Command::Robots), _) => lists::robots(context),
+        (Some(Command::Presets), _) => lists::presets(context),
+        (Some(Command::Scenarios), _) => lists::scenarios(context),
+        (None, None) => Ok(Exit::Unreadable), // `without_mixture` has refused it
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn an_interval_is_a_number_or_two() {
+        assert_eq!(interval("1.5"), Ok(Interval([1.5, 1.5])));
+        assert_eq!(interval("0.5..2"), Ok(Interval([0.5, 2.0])));
+        for bad in ["", "-1", "2..1", "1..", "..2", "a..b", "nan", "0..inf", "1...2"] {
+            assert!(interval(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_list_names_the_entry_that_is_no_number() {
+        assert_eq!(numbers("-1, 0,2e-1"), Ok(Numbers(vec![-1.0, 0.0, 0.2])));
+        assert_eq!(numbers("0,x,1"), Err("entry 2: `x` is not a number".to_owned()));
+        assert!(numbers("0,,1").is_err() && numbers("").is_err() && numbers("nan").is_err());
+    }
+}

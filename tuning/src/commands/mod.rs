@@ -1,0 +1,10 @@
+//! One file a command: read what it needs, call the library, print.
+
+pub mod certify;
+mod claims;
+pub mod inspect;
+pub mod lists;
+pub mod report;
+pub mod simulate;
+pub mod tune;
+pub mod verify;

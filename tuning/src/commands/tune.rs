@@ -1,0 +1,289 @@
+//! `autotune tune`: search, certify, judge, report.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use certune::certify::{Claims, FamilyValues};
+use certune::closed_loop::Scenario;
+use certune::dynamics::{Robot, for_joint_count};
+use certune::tune::filter::DEFAULT_SAMPLES;
+use certune::tune::{
+    AicObjective, Batch, Bench, Gains, HeldOut, Question, SearchError, SearchSettings, Space, TuneError, Tuned, tune,
+};
+use certune::verify::{Certificate, Claim, Verdict};
+use certune::{ArmCertifier, StabilityError, family_of};
+use serde::Serialize;
+
+use super::claims::{ClaimSummary, claims_in_words, summaries};
+use crate::catalogue::{self, DEFAULT_PRESET, GainsSource};
+use crate::cli::{Context, ControllerName, Exit, TuneArgs};
+use crate::error::Error;
+use crate::output::{self, number, table};
+use crate::page::{self, Spread, spread};
+use crate::progress::Terminal;
+use crate::run::{Folder, Run, RunFile};
+use crate::versions::versions;
+
+const DEFAULT_BUDGET: usize = 150;
+const DEFAULT_SEED: u64 = 1;
+/// Plants on which every candidate is simulated.
+const BATCH_PLANTS: usize = 8;
+/// Plants that judge start and winner.
+const HELD_OUT_PLANTS: usize = 32;
+/// Candidates brought before the certifier at most.
+const ATTEMPTS: usize = 12;
+
+/// Everything a run needs, found before anything is computed.
+struct Plan {
+    robot: Robot,
+    /// How the robot was named on the command line.
+    robot_argument: String,
+    scenario: Scenario,
+    family: FamilyValues,
+    space: Space,
+    start: Gains,
+    question: Question,
+    folder: Folder,
+    preset: String,
+    space_name: String,
+}
+
+#[derive(Debug, Serialize)]
+struct Summary<'a> {
+    directory: String,
+    certified: bool,
+    files: Vec<String>,
+    gains: Option<&'a Gains>,
+    held_out: Compared,
+    claims: Vec<ClaimSummary>,
+    elapsed_s: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Compared {
+    published: Option<Spread>,
+    tuned: Option<Spread>,
+}
+
+pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
+    let plan = plan(args)?;
+    let threads = args.threads.unwrap_or(0);
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|source| Error::Threads { threads, source })?;
+    output::prepare_folder(&plan.folder.path)?;
+    let progress = Terminal::new(context.verbose);
+    let outcome = pool.install(|| {
+        for_joint_count!(plan.robot.joints(), N => tune_arm::<N>(&plan, &progress))
+            .unwrap_or_else(|| Err(catalogue::too_many_joints(&plan.robot)))
+    });
+    progress.finish();
+    let (run, page) = outcome?;
+    let files = plan.folder.write(&run, &page)?;
+    let certified = run.file.record.winner.is_some();
+    let claims = run.certificate.as_ref();
+    if context.json {
+        let HeldOut { start, tuned } = &run.file.record.held_out;
+        output::print_json(&Summary {
+            directory: plan.folder.path.display().to_string(),
+            certified,
+            files: files.iter().map(|path| path.display().to_string()).collect(),
+            gains: run.file.record.tuned(),
+            held_out: Compared { published: start.as_ref().map(spread), tuned: tuned.as_ref().map(spread) },
+            claims: claims.map(summaries).unwrap_or_default(),
+            elapsed_s: progress.elapsed_s(),
+        })?;
+    } else {
+        output::print(&in_words(&plan, &run, &files, progress.elapsed_s()))?;
+    }
+    Ok(if certified { Exit::Holds } else { Exit::NotCertified })
+}
+
+fn plan(args: &TuneArgs) -> Result<Plan, Error> {
+    let controller = match args.controller {
+        None | Some(ControllerName::Aic) => "aic",
+        Some(ControllerName::Mrac) => return Err(Error::Mrac { command: "tune" }),
+    };
+    let budget = args.budget.unwrap_or(DEFAULT_BUDGET);
+    if budget == 0 {
+        return Err(TuneError::from(SearchError::NoBudget).into());
+    }
+    let robot = catalogue::robot(&args.robot, args.tip.as_deref())?;
+    let scenario = catalogue::scenario(args.scenario.as_deref(), &robot)?;
+    let family = family_of(&scenario.plant_box)?;
+    let (space_name, space) = catalogue::space(args.space.as_deref())?;
+    let preset = space.start().unwrap_or(DEFAULT_PRESET).to_owned();
+    let source = GainsSource::find(&preset)?;
+    let start =
+        Gains::from_table(source.aic("tune")?).map_err(|source| Error::NotShared { gains: preset.clone(), source })?;
+    // A start outside the space is refused before anything is computed.
+    space.admit(&start).map_err(|error| TuneError::from(SearchError::Start(error)))?;
+    let seed = args.seed.unwrap_or(DEFAULT_SEED);
+    let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(run_name(&robot, controller, seed)));
+    Ok(Plan {
+        question: Question {
+            robot: robot.name().to_owned(),
+            robot_sha256: robot.sha256(),
+            scenario: scenario.name.clone(),
+            versions: versions(),
+            search: SearchSettings::new(space.method(), budget, seed),
+            batch_plants: BATCH_PLANTS,
+            held_out_plants: HELD_OUT_PLANTS,
+            certification_attempts: ATTEMPTS,
+        },
+        robot_argument: args.robot.clone(),
+        robot,
+        scenario,
+        family,
+        space,
+        start,
+        folder: Folder { path },
+        // A path is the machine's business; the record holds the file's name.
+        preset: Path::new(&preset)
+            .file_name()
+            .map_or_else(|| preset.clone(), |name| name.to_string_lossy().into_owned()),
+        space_name,
+    })
+}
+
+/// `panda-aic-1`; a URDF may name its robot with anything, a folder may not.
+fn run_name(robot: &Robot, controller: &str, seed: u64) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '-' | '_') { c } else { '_' };
+    let name: String = robot.name().chars().map(plain).take(64).collect();
+    format!("{}-{controller}-{seed}", if name.is_empty() { "robot" } else { &name })
+}
+
+/// The run and its page.
+fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, String), Error> {
+    let Plan { robot, scenario, question, .. } = plan;
+    let seed = question.search.seed;
+    let objective = AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES)?;
+    let judge = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants)?;
+    progress.begin("sampling the arm's constants");
+    let certifier = ArmCertifier::<N>::new(robot, &plan.family)?;
+    let bench = Bench { objective: &objective, judge: &judge, progress };
+    let mut first_refusal: Option<Certificate> = None;
+    let mut failure: Option<StabilityError> = None;
+    let certify = |gains: &Gains| match certifier.certify(&gains.on_every_joint(), Claims::All) {
+        Ok(certificate) if certificate.all_hold() => Ok(certificate),
+        Ok(refusal) => {
+            let reason = why_not(&refusal);
+            progress.detail(|| format!("          {reason}"));
+            first_refusal.get_or_insert(refusal);
+            Err(reason)
+        }
+        Err(error) => {
+            let reason = error.to_string();
+            failure = Some(error);
+            Err(reason)
+        }
+    };
+    let Tuned { record, certificate } = tune(question.clone(), &plan.space, Some(&plan.start), bench, certify)?;
+    if let Some(error) = failure {
+        return Err(error.into());
+    }
+    let file = RunFile {
+        controller: "aic".to_owned(),
+        preset: plan.preset.clone(),
+        space_name: plan.space_name.clone(),
+        scenario: scenario.clone(),
+        record,
+    };
+    let run = Run { file, certificate: certificate.or(first_refusal) };
+    progress.begin("writing the report");
+    let page = page::page::<N>(&run, robot, &plan.robot_argument, &plan.folder)?;
+    Ok((run, page))
+}
+
+/// The claims that do not hold, in a few words.
+fn why_not(refusal: &Certificate) -> String {
+    let entries = refusal.document().claims.iter().zip(refusal.checked());
+    let reasons =
+        entries.filter(|(_, checked)| checked.verdict != Verdict::Holds).map(|(claim, checked)| match claim {
+            Claim::Refused(claim) => format!(
+                "{} refused: unstable at inertia {} kg m^2, friction {} N m s/rad, gravity stiffness {} N m/rad",
+                checked.kind,
+                claim.point.inertia_kg_m2,
+                claim.point.friction_n_m_s_per_rad,
+                claim.point.stiffness_n_m_per_rad
+            ),
+            Claim::NotProved(claim) => format!("{} not proved: {}", checked.kind, claim.reason),
+            Claim::Exponential(_) | Claim::Region(_) => checked.kind.to_owned(),
+        });
+    reasons.collect::<Vec<_>>().join("; ")
+}
+
+/// What a scenario does that no claim about its plant box covers.
+pub fn beyond_the_claims(scenario: &Scenario) -> Option<String> {
+    let mut parts = Vec::new();
+    if !scenario.payloads.is_empty() {
+        parts.push("loads attached and released");
+    }
+    if !scenario.pushes.is_empty() {
+        parts.push("pushes");
+    }
+    if scenario.noise.q_rad > 0.0 || scenario.noise.dq_rad_per_s > 0.0 {
+        parts.push("sensor noise");
+    }
+    (!parts.is_empty()).then(|| {
+        format!(
+            "Note: the claims speak of the scenario's plant box; its {} are outside them, simulation is the evidence there.",
+            parts.join(" and ")
+        )
+    })
+}
+
+fn in_words(plan: &Plan, run: &Run, files: &[PathBuf], elapsed_s: f64) -> String {
+    let record = &run.file.record;
+    let question = &record.question;
+    let mut text = format!(
+        "{} under the AIC in {}: {} candidates on {} plants, {elapsed_s:.1} s\n\n",
+        question.robot,
+        question.scenario,
+        record.evaluations.len(),
+        question.batch_plants
+    );
+    let HeldOut { start, tuned } = &record.held_out;
+    let [published, tuned] = [start, tuned].map(|verdict| verdict.as_ref().map(spread));
+    let row = |name: &str, digits: usize, scale: f64, value: fn(&Spread) -> Option<f64>| {
+        let cell = |spread: &Option<Spread>| number(spread.as_ref().and_then(value).map(|value| scale * value), digits);
+        vec![name.to_owned(), cell(&published), cell(&tuned)]
+    };
+    let rows = [
+        row("cost, worse half of the plants, s", 4, 1.0, |spread| spread.cost_s),
+        row("cost, worst plant, s", 4, 1.0, |spread| spread.worst_cost_s),
+        row("slowest move settles in, s", 3, 1.0, |spread| spread.settling_time_s),
+        row("largest final error, mrad", 3, 1e3, |spread| spread.final_error_rad),
+        row("largest overshoot, %", 2, 1e2, |spread| spread.overshoot),
+        row("largest torque, N m", 2, 1.0, |spread| spread.peak_torque_n_m),
+        row("largest torque rate RMS, N m/s", 1, 1.0, |spread| spread.torque_rate_rms_n_m_per_s),
+    ];
+    let held_out = format!("{} held-out plants", question.held_out_plants);
+    let header = [held_out.as_str(), &run.file.preset, "tuned"];
+    text.push_str(&table(&header, &rows));
+    let _ = writeln!(text);
+    match (record.winner(), &run.certificate) {
+        (Some(_), Some(certificate)) => text.push_str(&claims_in_words(certificate, false)),
+        (_, refusal) => {
+            let _ = writeln!(
+                text,
+                "NOT CERTIFIED: none of the {} candidates brought before the certifier holds both claims; no gains.toml was written.",
+                record.certification.len()
+            );
+            if let Some(refusal) = refusal {
+                let _ = writeln!(text, "The best of them:");
+                text.push_str(&claims_in_words(refusal, false));
+            }
+        }
+    }
+    if let Some(note) = beyond_the_claims(&run.file.scenario) {
+        text.push_str(&output::wrapped(&note, 0));
+    }
+    let names: Vec<_> = files.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy()).collect();
+    let _ = writeln!(text, "\n{}: {}", plan.folder.path.display(), names.join(", "));
+    if run.certificate.is_some() {
+        let _ = writeln!(text, "check it: autotune verify {}", plan.folder.certificate().display());
+    }
+    text
+}

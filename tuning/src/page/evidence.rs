@@ -1,0 +1,142 @@
+//! The certificate as the page shows it: claims with margins, the pole map, the radius against the moves.
+
+use certune::dynamics::Robot;
+use certune::poles_per_s;
+use certune::report::{
+    Assumption, CertificateRecord, Claim, GoalStep, Grade, Margin, Pair, Pole, PoleMap, RegionRecord, Verdict,
+};
+use certune::tune::Gains;
+use certune::verify::{self, Certificate, Checked};
+use num_traits::ToPrimitive;
+
+use super::runs::label;
+use crate::error::Error;
+use crate::run::Run;
+
+/// Configurations, each with a plant, of the pole map.
+const CONFIGURATIONS: usize = 120;
+
+/// The evidence of a run.
+pub fn evidence<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Result<CertificateRecord, Error> {
+    let scenario = &run.file.scenario;
+    let seed = run.file.record.question.search.seed;
+    let poles = |gains: &Gains| -> Result<Vec<Pole>, Error> {
+        let poles = poles_per_s::<N>(robot, &scenario.plant_box, &gains.on_every_joint(), CONFIGURATIONS, seed)?;
+        Ok(poles.into_iter().map(|[re, im]| Pole { re, im }).collect())
+    };
+    let poles = Pair { published: poles(&gains.published)?, tuned: poles(&gains.tuned)? };
+    let slowest = poles.tuned.iter().map(|pole| pole.re).reduce(f64::max);
+    let Some(certificate) = &run.certificate else {
+        let pole_map = Some(PoleMap { configurations: CONFIGURATIONS as u64, poles, certified_rate_per_s: None });
+        return Ok(CertificateRecord { pole_map, ..CertificateRecord::default() });
+    };
+    let document = certificate.document();
+    let find = |value: fn(&verify::Claim) -> Option<f64>| document.claims.iter().find_map(value);
+    let certified_rate_per_s = find(|claim| match claim {
+        verify::Claim::Exponential(claim) => Some(claim.rate_per_s.to_f64()),
+        verify::Claim::Region(_) | verify::Claim::Refused(_) | verify::Claim::NotProved(_) => None,
+    });
+    let radius_rad = find(|claim| match claim {
+        verify::Claim::Region(claim) => Some(claim.radius_rad.to_f64()),
+        verify::Claim::Exponential(_) | verify::Claim::Refused(_) | verify::Claim::NotProved(_) => None,
+    });
+    let entries = document.claims.iter().zip(certificate.checked());
+    Ok(CertificateRecord {
+        file_name: "certificate.json".to_owned(),
+        sha256: document.sha256.clone(),
+        claims: entries.map(|(claim, checked)| claim_row(claim, checked, certificate, slowest)).collect(),
+        pole_map: Some(PoleMap { configurations: CONFIGURATIONS as u64, poles, certified_rate_per_s }),
+        region: Some(RegionRecord { radius_rad, steps: steps(run) }),
+    })
+}
+
+fn grade(grade: verify::Grade) -> Grade {
+    match grade {
+        verify::Grade::Conditional => Grade::Conditional,
+        verify::Grade::Proved => Grade::Proved,
+    }
+}
+
+fn claim_row(claim: &verify::Claim, checked: &Checked, certificate: &Certificate, slowest: Option<f64>) -> Claim {
+    let assumptions = certificate.assumptions().into_iter();
+    Claim {
+        kind: checked.kind.to_owned(),
+        verdict: match checked.verdict {
+            verify::Verdict::Holds => Verdict::Holds,
+            verify::Verdict::Refused => Verdict::Refused,
+            verify::Verdict::NotProved => Verdict::NotProved,
+        },
+        grade: checked.grade.map_or(Grade::Sampled, grade),
+        statement: checked.statement.clone(),
+        assumptions: assumptions
+            .map(|assumption| Assumption { grade: grade(assumption.grade), text: assumption.text })
+            .collect(),
+        margins: margins(claim, checked, slowest),
+        counterexample: counterexample(claim),
+    }
+}
+
+fn margins(claim: &verify::Claim, checked: &Checked, slowest: Option<f64>) -> Vec<Margin> {
+    let margin =
+        |name: &str, value: Option<f64>, unit: &str| Margin { name: name.to_owned(), value, unit: unit.to_owned() };
+    let mut margins = match claim {
+        verify::Claim::Exponential(claim) => vec![
+            margin("certified decay rate", Some(claim.rate_per_s.to_f64()), "/s"),
+            margin("slowest pole of the sample", slowest, "/s"),
+        ],
+        verify::Claim::Region(claim) => vec![
+            margin("certified radius", Some(claim.radius_rad.to_f64()), "rad"),
+            margin("certified decay rate of the Lyapunov function's root", Some(claim.rate_per_s.to_f64()), "/s"),
+        ],
+        verify::Claim::Refused(_) => vec![margin("slowest pole of the sample", slowest, "/s")],
+        verify::Claim::NotProved(claim) => {
+            vec![margin(
+                "distance to feasibility",
+                claim.distance.as_ref().map(verify::Number::to_f64),
+                "solver's units",
+            )]
+        }
+    };
+    let pivots = checked.inequalities.iter().filter_map(|inequality| inequality.smallest_pivot.as_ref()?.to_f64());
+    if let Some(smallest) = pivots.reduce(f64::min) {
+        margins.push(margin("smallest pivot of the exact matrix inequalities", Some(smallest), ""));
+    }
+    margins
+}
+
+fn counterexample(claim: &verify::Claim) -> Vec<String> {
+    let refused = match claim {
+        verify::Claim::Refused(refused) => refused,
+        verify::Claim::Exponential(_) | verify::Claim::Region(_) | verify::Claim::NotProved(_) => return Vec::new(),
+    };
+    let point = &refused.point;
+    let mut sentences = vec![format!(
+        "The loop with inertia {} kg m², friction {} N m s/rad and gravity stiffness {} N m/rad is not stable (exact).",
+        point.inertia_kg_m2, point.friction_n_m_s_per_rad, point.stiffness_n_m_per_rad
+    )];
+    match &refused.attained {
+        Some(attained) => {
+            let q: Vec<String> = attained.q_rad.iter().map(ToString::to_string).collect();
+            let [re, im] = &attained.eigenvalue_per_s;
+            sentences.push(format!(
+                "An arm of the family is there at q = [{}] rad, payload {} kg; its eigenvalue is {re} and imaginary part {im} 1/s.",
+                q.join(", "),
+                attained.payload_kg
+            ));
+        }
+        None => sentences.push("No arm of the family was found at that point.".to_owned()),
+    }
+    sentences
+}
+
+/// The distance of each goal from the one before, as the region's claim measures it.
+fn steps(run: &Run) -> Vec<GoalStep> {
+    let scenario = &run.file.scenario;
+    let goals = scenario.segments.iter().map(|segment| &segment.goal_rad);
+    let befores = std::iter::once(&scenario.start_rad).chain(goals.clone());
+    let size = |(goal, before): (&Vec<f64>, &Vec<f64>)| {
+        goal.iter().zip(before).map(|(goal, before)| (goal - before).powi(2)).sum::<f64>().sqrt()
+    };
+    let sizes = goals.zip(befores).map(size);
+    sizes.enumerate().map(|(index, size_rad)| GoalStep { label: label(index), size_rad }).collect()
+}

@@ -1,0 +1,40 @@
+//! Figures of a set of gains over many plants.
+
+use certune::tune::{Figures, Outcome, PlantResult, Verdict};
+use serde::Serialize;
+
+/// The worst of each figure over the plants; a figure that a plant does not have is missing.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Mean cost of the worse half of the plants, as in the search.
+    pub cost_s: Option<f64>,
+    pub worst_cost_s: Option<f64>,
+    pub settling_time_s: Option<f64>,
+    pub final_error_rad: Option<f64>,
+    pub overshoot: Option<f64>,
+    pub peak_torque_n_m: Option<f64>,
+    pub torque_rate_rms_n_m_per_s: Option<f64>,
+    pub plants: usize,
+    pub diverged: usize,
+}
+
+/// The figures of a verdict.
+pub fn spread(verdict: &Verdict) -> Spread {
+    let plants = &verdict.plants;
+    let worst = |value: &dyn Fn(&PlantResult) -> Option<f64>| {
+        let values: Option<Vec<f64>> = plants.iter().map(value).collect();
+        values.filter(|values| !values.is_empty()).map(|values| values.into_iter().fold(0.0, f64::max))
+    };
+    let figure = |value: fn(&Figures) -> Option<f64>| worst(&|plant: &PlantResult| value(&plant.figures));
+    Spread {
+        cost_s: verdict.outcome.cost_s(),
+        worst_cost_s: worst(&|plant| plant.outcome.cost_s()),
+        settling_time_s: figure(|figures| figures.settling_time_s),
+        final_error_rad: figure(|figures| figures.final_error_rad),
+        overshoot: figure(|figures| figures.overshoot),
+        peak_torque_n_m: figure(|figures| figures.peak_torque_n_m),
+        torque_rate_rms_n_m_per_s: figure(|figures| figures.torque_rate_rms_n_m_per_s),
+        plants: plants.len(),
+        diverged: plants.iter().filter(|plant| matches!(plant.outcome, Outcome::Diverged { .. })).count(),
+    }
+}

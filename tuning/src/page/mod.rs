@@ -1,0 +1,289 @@
+//! A run's record into the data of its page.
+//!
+//! What the record does not hold, the course of single runs, is simulated again: the same numbers come out, so `tune` and `report`
+//! make the same page. The nominal plant is the middle of the scenario's plant box.
+
+mod evidence;
+mod figures;
+mod runs;
+
+use certune::closed_loop::PlantBox;
+use certune::dynamics::Robot;
+use certune::report::{
+    Asked, CommandLine, CostMeaning, Evaluation, GainRow, Pair, RangeRow, SearchBounds, SearchRecord, SensitivityRow,
+    TuningReport, Version, tuning_report,
+};
+use certune::tune::{Freedom, Gain, Gains, Outcome, Phase, RunRecord, Scale};
+
+use crate::catalogue;
+use crate::error::Error;
+use crate::run::{Folder, Run};
+
+pub use figures::{Spread, spread};
+
+/// Two values this close, as a fraction of the range, are called the same.
+const ON_BOUND: f64 = 0.005;
+
+/// The page of a run on an arm of `N` joints. `robot_argument` names the robot in the commands that the page shows.
+pub fn page<const N: usize>(run: &Run, robot: &Robot, robot_argument: &str, folder: &Folder) -> Result<String, Error> {
+    let record = &run.file.record;
+    let gains = compared(run)?;
+    let runs = runs::runs::<N>(run, robot, &gains)?;
+    let certified = record.winner.is_some();
+    let report = TuningReport {
+        asked: asked(run, robot, robot_argument),
+        gains: gain_rows(record, &gains),
+        response: runs.response,
+        segments: runs.segments,
+        held_out: runs.held_out,
+        search: search(record),
+        sensitivity: sensitivity(record),
+        certificate: evidence::evidence::<N>(run, robot, &gains)?,
+        recheck: recheck(run, robot_argument, folder, certified),
+        method: method(run, certified),
+        versions: record
+            .question
+            .versions
+            .iter()
+            .map(|(name, version)| Version { name: name.clone(), version: version.clone() })
+            .collect(),
+    };
+    Ok(tuning_report(&report)?)
+}
+
+/// The published gains, and the winner or, without one, the candidate of the lowest cost.
+fn compared(run: &Run) -> Result<Pair<Gains>, Error> {
+    let record = &run.file.record;
+    let published = match record.start() {
+        Some(start) => start.gains,
+        None => {
+            let source = catalogue::GainsSource::find(catalogue::DEFAULT_PRESET)?;
+            Gains::from_table(source.aic("report")?)
+                .map_err(|source| Error::NotShared { gains: catalogue::DEFAULT_PRESET.to_owned(), source })?
+        }
+    };
+    let best = || record.evaluations.iter().min_by_key(|evaluation| (evaluation.outcome, evaluation.index));
+    let tuned = record.winner().or_else(best).map_or(published, |evaluation| evaluation.gains);
+    Ok(Pair { published, tuned })
+}
+
+fn asked(run: &Run, robot: &Robot, robot_argument: &str) -> Asked {
+    let question = &run.file.record.question;
+    Asked {
+        robot: question.robot.clone(),
+        joints: robot.joints(),
+        controller: run.file.controller.clone(),
+        preset: run.file.preset.clone(),
+        scenario: question.scenario.clone(),
+        scenario_in_words: run.file.scenario.description.clone(),
+        plant_box: plant_box_rows(&run.file.scenario.plant_box),
+        cost: CostMeaning {
+            unit: "s".to_owned(),
+            in_words: "Per move: lag (the time constant of a first-order arm with the same time-weighted error) + torque-rate RMS over \
+                       1000 N m/s + overshoot + time at the torque limits; mean over the moves, then over the worse half of the plants."
+                .to_owned(),
+        },
+        seed: question.search.seed,
+        budget: question.search.evaluations as u64,
+        command: command(run, robot_argument),
+    }
+}
+
+/// The command that repeats the run; a scenario or space that is not built in is named by a file of its name.
+fn command(run: &Run, robot_argument: &str) -> String {
+    let question = &run.file.record.question;
+    let search = &question.search;
+    let scenario = &run.file.scenario;
+    let mut command = format!("autotune --robot {}", quoted(robot_argument));
+    if catalogue::is_built_in(scenario) {
+        command.push_str(&format!(" --scenario {}", scenario.name));
+    } else if scenario.name != "generic" {
+        command.push_str(&format!(" --scenario {}", quoted(&format!("{}.toml", scenario.name))));
+    }
+    if !catalogue::SPACES.iter().any(|(name, _)| *name == run.file.space_name) {
+        command.push_str(&format!(" --space {}", quoted(&format!("{}.toml", run.file.space_name))));
+    }
+    command.push_str(&format!(" --seed {} --budget {}", search.seed, search.evaluations));
+    command
+}
+
+/// An argument for a shell.
+fn quoted(argument: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.' | '/' | ':' | '\\');
+    if !argument.is_empty() && argument.chars().all(plain) {
+        argument.to_owned()
+    } else {
+        format!("'{}'", argument.replace('\'', r"'\''"))
+    }
+}
+
+fn plant_box_rows(plants: &PlantBox) -> Vec<RangeRow> {
+    let row = |name: &str, [lower, upper]: [f64; 2], unit: &str| RangeRow {
+        name: name.to_owned(),
+        lower,
+        upper,
+        unit: unit.to_owned(),
+    };
+    let gravity =
+        if plants.gravity_compensation { "gravity compensated (1 = yes)" } else { "gravity compensated (0 = no)" };
+    let switch = f64::from(u8::from(plants.gravity_compensation));
+    vec![
+        row("link masses over nominal", [1.0 - plants.mass_uncertainty, 1.0 + plants.mass_uncertainty], ""),
+        row("payload", plants.payload_kg, "kg"),
+        row("viscous friction", plants.friction_n_m_s_per_rad, "N m s/rad"),
+        row("rotor inertia", plants.rotor_inertia_kg_m2, "kg m²"),
+        row("delay", plants.delay_samples.map(|samples| samples as f64), "samples"),
+        row(gravity, [switch; 2], ""),
+    ]
+}
+
+fn gain_rows(record: &RunRecord, gains: &Pair<Gains>) -> Vec<GainRow> {
+    let unit = |gain: Gain| match gain {
+        Gain::KappaMu => "1/s",
+        Gain::KappaA => "N m/(rad s)",
+        Gain::SigmaQ | Gain::SigmaDq | Gain::SigmaMu | Gain::SigmaDmu => "",
+        Gain::ReferenceTimeConstantS => "s",
+    };
+    let row = |gain: Gain| {
+        let tuned = gains.tuned.get(gain);
+        let freedom = record.space.iter().find(|row| row.gain == gain).map(|row| row.freedom);
+        let bounds = match freedom {
+            Some(Freedom::Free(range)) => {
+                let place = match range.scale {
+                    Scale::Log => (tuned / range.lower).ln() / (range.upper / range.lower).ln(),
+                    Scale::Linear => (tuned - range.lower) / (range.upper - range.lower),
+                };
+                let on_bound = !(ON_BOUND..=1.0 - ON_BOUND).contains(&place);
+                Some(SearchBounds { lower: range.lower, upper: range.upper, on_bound })
+            }
+            Some(Freedom::Fixed(_)) | None => None,
+        };
+        let (name, unit) = (gain.key().to_owned(), unit(gain).to_owned());
+        GainRow { name, joint: None, unit, published: gains.published.get(gain), tuned, bounds }
+    };
+    Gain::ALL.into_iter().map(row).collect()
+}
+
+fn search(record: &RunRecord) -> SearchRecord {
+    let mut best_so_far: Option<f64> = None;
+    let evaluations = record.evaluations.iter().map(|evaluation| {
+        let cost = evaluation.outcome.cost_s();
+        best_so_far = match (best_so_far, cost) {
+            (Some(best), Some(cost)) => Some(best.min(cost)),
+            (best, cost) => best.or(cost),
+        };
+        let phase = match evaluation.phase {
+            Phase::Start => "start",
+            Phase::Simplex { .. } => "nelder-mead",
+            Phase::Swarm { .. } => "particle-swarm",
+        };
+        let outcome = match evaluation.outcome {
+            Outcome::Certified { .. } => "certified",
+            Outcome::Simulated { .. } => "simulated, certificate not asked for",
+            Outcome::Uncertified { .. } => "simulated, certificate refused",
+            Outcome::Unstable { .. } => "unstable",
+            Outcome::Diverged { .. } => "diverged",
+        };
+        Evaluation {
+            index: evaluation.index as u64,
+            phase: phase.to_owned(),
+            outcome: outcome.to_owned(),
+            cost,
+            best_so_far,
+        }
+    });
+    SearchRecord {
+        evaluations: evaluations.collect(),
+        published_cost: record.start().and_then(|start| start.outcome.cost_s()),
+    }
+}
+
+fn sensitivity(record: &RunRecord) -> Vec<SensitivityRow> {
+    let Some(cost) = record.winner().and_then(|winner| winner.outcome.cost_s()) else { return Vec::new() };
+    let ratio = |outcome: Outcome| outcome.cost_s().map(|changed| changed / cost);
+    let row = |row: &certune::tune::Sensitivity| SensitivityRow {
+        gain: row.gain.key().to_owned(),
+        ratio_at_minus_10_percent: ratio(row.at_minus_10_percent),
+        ratio_at_plus_10_percent: ratio(row.at_plus_10_percent),
+    };
+    record.sensitivity.iter().map(row).collect()
+}
+
+fn recheck(run: &Run, robot_argument: &str, folder: &Folder, certified: bool) -> Vec<CommandLine> {
+    let line = |command: String, shows: &str| CommandLine { command, shows: shows.to_owned() };
+    let file = |path: std::path::PathBuf| quoted(&path.to_string_lossy());
+    let mut lines = Vec::new();
+    if run.certificate.is_some() {
+        lines.push(line(
+            format!("autotune verify {}", file(folder.certificate())),
+            "Reads the certificate alone, derives every matrix again and decides every inequality in exact arithmetic.",
+        ));
+    }
+    let scenario = &run.file.scenario;
+    let scenario_argument = if catalogue::is_built_in(scenario) {
+        format!(" --scenario {}", scenario.name)
+    } else if scenario.name == "generic" {
+        String::new()
+    } else {
+        format!(" --scenario {}", quoted(&format!("{}.toml", scenario.name)))
+    };
+    if certified {
+        let robot = quoted(robot_argument);
+        let gains = file(folder.gains());
+        if !scenario_argument.is_empty() {
+            lines.push(line(
+                format!("autotune certify --robot {robot} --gains {gains}{scenario_argument}"),
+                "Samples the arm's constants again and searches for the proofs again.",
+            ));
+        }
+        let plant = runs::middle(&scenario.plant_box);
+        lines.push(line(
+            format!(
+                "autotune simulate --robot {robot} --gains {gains}{scenario_argument} --payload {} --friction {} --rotor-inertia {}",
+                plant.payload_kg, plant.friction_n_m_s_per_rad, plant.rotor_inertia_kg_m2
+            ),
+            "Repeats the nominal run with the tuned gains.",
+        ));
+    }
+    lines.push(line(
+        command(run, robot_argument),
+        "Repeats the whole run; gains.toml and run.json come out the same to the byte.",
+    ));
+    lines
+}
+
+fn method(run: &Run, certified: bool) -> Vec<String> {
+    let record = &run.file.record;
+    let question = &record.question;
+    let plants = runs::middle(&run.file.scenario.plant_box);
+    let mut paragraphs = vec![
+        format!(
+            "{} candidates were looked at. Each whose linearised loop decays at every configuration of a fixed sample ran the scenario on the \
+             same {} plants, drawn from the box with seed {}.",
+            record.evaluations.len(),
+            question.batch_plants,
+            question.search.seed
+        ),
+        format!(
+            "Candidates went before the certifier from the lowest cost upwards ({} of them). The certificate is claimed on the whole box, \
+             not on the plants that were drawn. {} further plants, which the search never saw, judge the result.",
+            record.certification.len(),
+            question.held_out_plants
+        ),
+        format!(
+            "The nominal plant of the curves is the middle of the box: nominal link masses, payload {} kg, friction {} N m s/rad, rotor \
+             inertia {} kg m².",
+            plants.payload_kg, plants.friction_n_m_s_per_rad, plants.rotor_inertia_kg_m2
+        ),
+    ];
+    if !certified {
+        paragraphs.insert(
+            0,
+            "No candidate was certified. What the page calls tuned is the candidate of the lowest cost; it is not recommended, and no gains \
+             file was written."
+                .to_owned(),
+        );
+    }
+    paragraphs.extend(crate::commands::tune::beyond_the_claims(&run.file.scenario));
+    paragraphs
+}

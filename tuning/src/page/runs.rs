@@ -1,0 +1,205 @@
+//! Runs that are simulated again for their curves: the nominal plant, and the held-out plants.
+
+use certune::closed_loop::{
+    Metrics, NoiseStream, Plant, PlantBox, PlantSetting, Sample, Segment, Task, Trajectory, aic_diagnostics, simulate,
+};
+use certune::control::aic::{Aic, AicParams, AicState};
+use certune::dynamics::{Joints, Robot};
+use certune::report::{Bands, HeldOut, Pair, PlantRow, Response, SegmentMetrics, SegmentRow, Trajectory as Curves};
+use certune::tune::{Batch, Gains, PlantResult, Verdict, score};
+use rayon::prelude::*;
+
+use crate::error::Error;
+use crate::run::Run;
+
+/// Samples from one point of a nominal curve to the next.
+const CURVE_EVERY: u64 = 10;
+/// Samples from one point of a band to the next.
+const BAND_EVERY: u64 = 50;
+
+/// What `runs` makes.
+pub struct Runs {
+    pub response: Response,
+    pub segments: Vec<SegmentRow>,
+    pub held_out: HeldOut,
+}
+
+/// One plant in the middle of a box.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Middle {
+    pub payload_kg: f64,
+    pub friction_n_m_s_per_rad: f64,
+    pub rotor_inertia_kg_m2: f64,
+}
+
+/// The middle of a box, in decimals that a command line takes.
+pub fn middle(plants: &PlantBox) -> Middle {
+    let of = |[low, high]: [f64; 2]| (1e6 * 0.5 * (low + high)).round() / 1e6;
+    Middle {
+        payload_kg: of(plants.payload_kg),
+        friction_n_m_s_per_rad: of(plants.friction_n_m_s_per_rad),
+        rotor_inertia_kg_m2: of(plants.rotor_inertia_kg_m2),
+    }
+}
+
+/// Simulates both sets of gains.
+pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Result<Runs, Error> {
+    let record = &run.file.record;
+    let (scenario, question) = (&run.file.scenario, &record.question);
+    let seed = question.search.seed;
+    let batch = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants)?;
+    let task = batch.task();
+    let params = |gains: &Gains| {
+        AicParams::<N>::new(&gains.on_every_joint(), task.step_s)
+            .map_err(|source| Error::Gains { gains: "of the run".to_owned(), source })
+    };
+    let controllers = Pair { published: Aic::new(&params(&gains.published)?), tuned: Aic::new(&params(&gains.tuned)?) };
+
+    let centre = middle(&scenario.plant_box);
+    let setting = PlantSetting::nominal(robot, scenario.plant_box.gravity_compensation)
+        .with_payload(centre.payload_kg)
+        .with_friction(centre.friction_n_m_s_per_rad)
+        .with_rotor_inertia(centre.rotor_inertia_kg_m2);
+    let nominal = Plant::<N>::new(robot, &setting)?;
+    let noise = NoiseStream { seed, index: 0 };
+    let (published, published_metrics) = curves(&nominal, task, &controllers.published, noise);
+    let (tuned, tuned_metrics) = curves(&nominal, task, &controllers.tuned, noise);
+
+    let (published_bands, published_costs) = held_out(&batch, &controllers.published, &scenario.start_rad);
+    let (tuned_bands, tuned_costs) = held_out(&batch, &controllers.tuned, &scenario.start_rad);
+    let published_costs = recorded(record.held_out.start.as_ref()).unwrap_or(published_costs);
+    let tuned_costs = recorded(record.held_out.tuned.as_ref()).unwrap_or(tuned_costs);
+    let plants = batch.plants().iter().zip(published_costs.into_iter().zip(tuned_costs));
+    let limits = robot.links().iter().map(|link| link.limits.torque_n_m);
+    Ok(Runs {
+        response: Response {
+            joint_names: robot.links().iter().map(|link| link.joint_name.clone()).collect(),
+            torque_limit_n_m: if scenario.torque_limits && limits.clone().all(f64::is_finite) {
+                limits.collect()
+            } else {
+                Vec::new()
+            },
+            runs: Pair { published, tuned },
+        },
+        segments: segments(&published_metrics, &tuned_metrics),
+        held_out: HeldOut {
+            plants: plants
+                .map(|((index, _), (published, tuned))| PlantRow {
+                    index: *index,
+                    in_words: in_words(&scenario.plant_box.draw(N, seed, *index)),
+                    cost: Pair { published, tuned },
+                })
+                .collect(),
+            bands: Pair { published: published_bands, tuned: tuned_bands },
+        },
+    })
+}
+
+/// The costs that a verdict holds.
+fn recorded(verdict: Option<&Verdict>) -> Option<Vec<Option<f64>>> {
+    let cost = |plant: &PlantResult| plant.outcome.cost_s();
+    verdict.map(|verdict| verdict.plants.iter().map(cost).collect())
+}
+
+fn curves<const N: usize>(plant: &Plant<N>, task: &Task<N>, aic: &Aic<N>, noise: NoiseStream) -> (Curves, Metrics) {
+    let mut recorder = Trajectory::new(CURVE_EVERY, aic_diagnostics(aic));
+    let metrics = simulate(plant, task, aic, noise, &mut recorder);
+    let rows = recorder.into_rows();
+    let series = |value: fn(&certune::closed_loop::Row<N, certune::closed_loop::AicDiagnostics<N>>) -> &Joints<N>| {
+        (0..N).map(|joint| rows.iter().map(|row| value(row)[joint]).collect()).collect()
+    };
+    let curves = Curves {
+        time_s: rows.iter().map(|row| row.t_s).collect(),
+        q_rad: series(|row| &row.q),
+        goal_rad: series(|row| &row.goal),
+        tau_n_m: series(|row| &row.tau),
+        free_energy: rows.iter().map(|row| row.diagnostics.free_energy).collect(),
+        diverged_at_s: metrics.diverged_at_s,
+    };
+    (curves, metrics)
+}
+
+/// How a move is called.
+pub fn label(index: usize) -> String {
+    format!("move {}", index + 1)
+}
+
+fn segments(published: &Metrics, tuned: &Metrics) -> Vec<SegmentRow> {
+    let count = published.segments.len().max(tuned.segments.len());
+    let figures =
+        |metrics: &Metrics, index: usize| metrics.segments.get(index).map_or_else(SegmentMetrics::default, figures);
+    (0..count)
+        .map(|index| SegmentRow {
+            label: label(index),
+            metrics: Pair { published: figures(published, index), tuned: figures(tuned, index) },
+        })
+        .collect()
+}
+
+fn figures(segment: &Segment) -> SegmentMetrics {
+    let largest = |values: &[f64]| values.iter().copied().reduce(f64::max);
+    SegmentMetrics {
+        settling_time_s: segment.slowest_settling_time_s(),
+        final_error_rad: Some(segment.worst_final_error_rad()),
+        overshoot: Some(segment.worst_overshoot()),
+        peak_torque_n_m: largest(&segment.peak_torque_n_m),
+        torque_rate_rms_n_m_per_s: largest(&segment.torque_rate_rms_n_m_per_s),
+        saturated_steps: segment.saturated_steps.iter().sum(),
+        itae_rad_s2: Some(segment.itae_rad_s2.iter().sum()),
+    }
+}
+
+/// Bands of the position error over the plants, and each plant's cost.
+fn held_out<const N: usize>(batch: &Batch<N>, aic: &Aic<N>, start_rad: &[f64]) -> (Bands, Vec<Option<f64>>) {
+    let task = batch.task();
+    let one = |(index, plant): &(u64, Plant<N>)| {
+        let mut recorder = Trajectory::new(BAND_EVERY, |_: &Sample<'_, N, AicState<N>>| ());
+        let metrics = simulate(plant, task, aic, batch.noise(*index), &mut recorder);
+        let errors: Vec<f64> = recorder.rows().iter().map(|row| (row.q - row.goal).norm()).collect();
+        (errors, score::of_run(&metrics, start_rad, task.step_s).cost_s())
+    };
+    let (errors, costs): (Vec<Vec<f64>>, Vec<Option<f64>>) = batch.plants().par_iter().map(one).unzip();
+    let samples = errors.iter().map(Vec::len).max().unwrap_or(0);
+    let mut bands = Bands::default();
+    for sample in 0..samples {
+        // A run that has diverged has no error any more: it counts as larger than all others.
+        let mut column: Vec<f64> =
+            errors.iter().map(|errors| errors.get(sample).copied().unwrap_or(f64::INFINITY)).collect();
+        column.sort_by(f64::total_cmp);
+        bands.time_s.push(sample as f64 * BAND_EVERY as f64 * task.step_s);
+        bands.error_p05_rad.push(quantile(&column, 0.05));
+        bands.error_p50_rad.push(quantile(&column, 0.5));
+        bands.error_p95_rad.push(quantile(&column, 0.95));
+    }
+    (bands, costs)
+}
+
+/// The smallest of sorted values that the given part of them does not exceed; NaN when it is infinite.
+fn quantile(sorted: &[f64], part: f64) -> f64 {
+    let rank = ((part * sorted.len() as f64).ceil() as usize).max(1);
+    sorted.get(rank - 1).copied().filter(|value| value.is_finite()).unwrap_or(f64::NAN)
+}
+
+/// A plant in a few words.
+fn in_words(plant: &PlantSetting) -> String {
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
+    format!(
+        "payload {:.2} kg, link masses {:+.0} % on average, friction {:.2} N m s/rad on average",
+        plant.payload_kg,
+        100.0 * (mean(&plant.link_mass_scale) - 1.0),
+        mean(&plant.viscous_n_m_s_per_rad)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quantile;
+
+    #[test]
+    fn a_quantile_counts_diverged_runs_as_the_worst() {
+        let sorted = [1.0, 2.0, 3.0, f64::INFINITY];
+        assert!((quantile(&sorted, 0.05) - 1.0).abs() < 1e-15);
+        assert!((quantile(&sorted, 0.5) - 2.0).abs() < 1e-15);
+        assert!(quantile(&sorted, 0.95).is_nan() && quantile(&[], 0.5).is_nan());
+    }
+}

@@ -1,0 +1,100 @@
+//! How a run is coming along: bars on stderr with rate and time left, nothing when stderr is no terminal.
+
+use std::time::{Duration, Instant};
+
+use certune::tune::{Evaluation, Outcome, Progress, Stage, TuneProgress};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::output;
+
+const SPINNER: &str = "  {spinner} {msg}";
+const BAR: &str = "  search {bar:32} {pos}/{len} candidates, {per_sec}, {eta} left, {msg}";
+
+/// One line on a terminal, redrawn; with `verbose`, lines that stay as well.
+pub struct Terminal {
+    bar: ProgressBar,
+    verbose: bool,
+    began: Instant,
+}
+
+impl Terminal {
+    pub fn new(verbose: bool) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+        Self { bar, verbose, began: Instant::now() }
+    }
+
+    /// Something without a measurable length begins.
+    pub fn begin(&self, what: &str) {
+        self.bar.set_style(style(SPINNER));
+        self.bar.set_message(what.to_owned());
+        self.bar.enable_steady_tick(Duration::from_millis(120));
+        self.detail(|| format!("[{:5.1} s] {what}", self.began.elapsed().as_secs_f64()));
+    }
+
+    /// A line that stays, for those who asked for more.
+    pub fn detail(&self, line: impl FnOnce() -> String) {
+        if self.verbose {
+            self.bar.suspend(|| output::say(&line()));
+        }
+    }
+
+    /// Wipes the line.
+    pub fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+
+    pub fn elapsed_s(&self) -> f64 {
+        self.began.elapsed().as_secs_f64()
+    }
+}
+
+/// The template is a constant; should it not parse, a plain bar does as well.
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
+/// An outcome in words.
+pub fn in_words(outcome: Outcome) -> String {
+    match outcome {
+        Outcome::Certified { cost_s } => format!("certified, cost {:.4} s", cost_s.get()),
+        Outcome::Simulated { cost_s } => format!("cost {:.4} s", cost_s.get()),
+        Outcome::Uncertified { cost_s } => format!("not certified, cost {:.4} s", cost_s.get()),
+        Outcome::Unstable { abscissa_per_s } => format!("unstable, grows at {:.3} /s", abscissa_per_s.get()),
+        Outcome::Diverged { at_s } => format!("diverged at {:.3} s", at_s.get()),
+    }
+}
+
+impl Progress for Terminal {
+    fn evaluated(&self, done: usize, evaluations: usize, evaluation: &Evaluation, best: &Evaluation) {
+        self.bar.set_length(evaluations as u64);
+        self.bar.set_position(done as u64);
+        self.bar.set_message(format!("best {}", in_words(best.outcome)));
+        if evaluation.index == best.index {
+            self.detail(|| {
+                format!("[{:5.1} s] candidate {}: {}", self.elapsed_s(), evaluation.index, in_words(evaluation.outcome))
+            });
+        }
+    }
+}
+
+impl TuneProgress for Terminal {
+    fn stage(&self, stage: Stage<'_>) {
+        match stage {
+            Stage::Search => {
+                self.bar.reset();
+                self.bar.disable_steady_tick();
+                self.bar.set_style(style(BAR));
+                self.bar.set_message("first candidate");
+                self.detail(|| format!("[{:5.1} s] search", self.elapsed_s()));
+            }
+            Stage::Certify { attempt, candidate } => {
+                self.begin(&format!(
+                    "certifying candidate {} (attempt {attempt}), {}",
+                    candidate.index,
+                    in_words(candidate.outcome)
+                ));
+            }
+            Stage::Judge => self.begin("judging on held-out plants"),
+        }
+    }
+}

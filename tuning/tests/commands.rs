@@ -1,0 +1,158 @@
+//! What each command prints, and its exit code, when nothing is wrong.
+
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod common;
+
+use common::{autotune, json, stdout, urdf};
+use serde_json::Value;
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
+}
+
+#[test]
+fn help_and_version_exit_with_0() {
+    let folder = tempfile::tempdir().unwrap();
+    for arguments in ["--help", "-h", "tune --help", "certify --help", "verify --help", "inspect --help", "--version"] {
+        assert!(stdout(folder.path(), arguments, 0).contains("autotune"), "{arguments}");
+    }
+    assert!(stdout(folder.path(), "--help", 0).contains("Exit codes"));
+}
+
+#[test]
+fn no_argument_prints_the_help_and_fails() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = autotune(folder.path()).assert().code(1).get_output().clone();
+    assert!(String::from_utf8_lossy(&output.stderr).contains("Usage"));
+}
+
+#[test]
+fn inspect_gives_the_dynamics_under_the_promised_keys() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = "inspect --robot panda --q=0,0.2,0,-1,0,1.2,0 --dq 0.1,0,0,-0.2,0,0,0";
+    let found = json(folder.path(), at, 0);
+    for key in ["mass_matrix_kg_m2", "gravity_jacobian_n_m_per_rad"] {
+        let rows = found[key].as_array().unwrap();
+        assert_eq!(rows.len(), 7);
+        for (i, row) in rows.iter().enumerate() {
+            for (j, value) in numbers(row).into_iter().enumerate() {
+                assert!((value - numbers(&rows[j])[i]).abs() < 1e-12, "{key} is symmetric");
+            }
+        }
+    }
+    for key in ["coriolis_torque_n_m", "gravity_torque_n_m", "ddq_rad_per_s2"] {
+        assert_eq!(numbers(&found[key]).len(), 7, "{key}");
+    }
+    // Negative first numbers, with and without an equals sign, mean the same.
+    let one = stdout(folder.path(), "inspect --robot panda --q=-1,0.2,0,-1,0,1.2,0", 0);
+    assert_eq!(one, stdout(folder.path(), "inspect --robot panda --q -1,0.2,0,-1,0,1.2,0", 0));
+    assert!(one.contains("mass matrix") && one.contains("panda_joint7"));
+}
+
+#[test]
+fn holding_torque_leaves_the_arm_at_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let gravity = json(folder.path(), "inspect --robot panda-bare --q 0.3,0.2,0.1,-1,0.5,1.2,0", 0);
+    let tau: Vec<String> = numbers(&gravity["gravity_torque_n_m"]).iter().map(f64::to_string).collect();
+    let held =
+        json(folder.path(), &format!("inspect --robot panda-bare --q 0.3,0.2,0.1,-1,0.5,1.2,0 --tau={}", tau.join(",")), 0);
+    assert!(numbers(&held["ddq_rad_per_s2"]).iter().all(|ddq| ddq.abs() < 1e-9));
+}
+
+#[test]
+fn simulate_reproduces_the_published_behaviour_and_writes_csv() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = "simulate --robot panda --gains pezzato2020-simulation --scenario pick-and-place-paper --csv run.csv";
+    let run = json(folder.path(), arguments, 0);
+    assert!(run["diverged_at_s"].is_null());
+    let segments = run["segments"].as_array().unwrap();
+    assert_eq!(segments.len(), 5);
+    for key in ["goal_rad", "final_error_rad", "settling_time_s", "overshoot", "peak_torque_n_m", "saturated_steps"] {
+        assert_eq!(segments[0][key].as_array().unwrap().len(), 7, "{key}");
+    }
+    // The reference, B to A, joints 1 2 3 4 6, in mrad.
+    let errors = numbers(&segments[0]["final_error_rad"]);
+    for (joint, mrad) in [(0, -2.20), (1, -0.89), (2, -0.15), (3, 2.84), (5, -2.71)] {
+        assert!((1e3 * errors[joint] - mrad).abs() < 0.02, "joint {joint}: {} rad", errors[joint]);
+    }
+    let csv = std::fs::read_to_string(folder.path().join("run.csv")).unwrap();
+    let columns: Vec<usize> = csv.lines().map(|line| line.split(',').count()).collect();
+    assert!(columns.len() == 3001 && columns.iter().all(|count| *count == 29), "a header, and 30 s each 10 ms");
+}
+
+#[test]
+fn simulate_runs_every_preset_and_another_arm() {
+    let folder = tempfile::tempdir().unwrap();
+    let presets = json(folder.path(), "presets", 0);
+    let names: Vec<&str> = presets.as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap()).collect();
+    assert_eq!(names.len(), 5);
+    for name in names {
+        let arguments = format!("simulate --robot panda --gains {name} --rotor-inertia 0.1 --scenario push");
+        assert!(json(folder.path(), &arguments, 0)["diverged_at_s"].is_null(), "{name}");
+    }
+    let ur5 = urdf("ur5.urdf");
+    let arguments = format!("simulate --robot {} --gains pezzato2020-simulation --friction 1", ur5.display());
+    let run = json(folder.path(), &arguments, 0);
+    assert_eq!(run["segments"][0]["goal_rad"].as_array().unwrap().len(), 6);
+}
+
+#[test]
+fn a_run_that_diverges_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let preset = include_str!("../presets/pezzato2020-simulation.toml").replace("sigma_dq = 1.0", "sigma_dq = 5.0");
+    std::fs::write(folder.path().join("fast.toml"), preset).unwrap();
+    let arguments = "simulate --robot panda --gains fast.toml --scenario pick-and-place-paper";
+    assert!(json(folder.path(), arguments, 0)["diverged_at_s"].as_f64().is_some_and(|at_s| at_s > 0.0));
+    assert!(stdout(folder.path(), arguments, 0).contains("DIVERGED"));
+}
+
+#[test]
+fn what_certify_writes_verify_accepts() {
+    let folder = tempfile::tempdir().unwrap();
+    let exponential = "certify --robot panda --gains pezzato2020-simulation --claim exponential --out a.json";
+    let made = json(folder.path(), exponential, 0);
+    assert!(made["claims"][0]["rate_per_s"].as_f64().unwrap() >= 0.7);
+    assert_eq!(made["claims"][0]["grade"], "conditional");
+    let region = "certify --robot panda --gains pezzato2020-simulation --claim region --gravity-compensation on --out b.json";
+    let without = json(folder.path(), region, 0);
+    assert!(without["claims"][0]["radius_rad"].as_f64().unwrap() >= 0.33);
+    let with = json(folder.path(), &format!("{region} --friction 1..3"), 0);
+    assert!(with["claims"][0]["radius_rad"].as_f64().unwrap() >= 0.80);
+    let checked = json(folder.path(), "verify a.json b.json", 0);
+    assert_eq!(checked[0]["verdict"], "holds");
+    assert_eq!(checked[0]["sha256"], made["sha256"]);
+    assert!(checked[1]["claims"][0]["inequalities"][0]["smallest_pivot"].as_f64().unwrap() > 0.0);
+    let words = stdout(folder.path(), "verify b.json", 0);
+    assert!(words.contains("region: holds (conditional)") && words.contains("assumptions") && words.contains("pivot"));
+}
+
+#[test]
+fn a_refusal_exits_with_2_and_verifies_as_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = "certify --robot panda --gains pezzato2020-libfranka --claim exponential --out refused.json";
+    assert!(stdout(folder.path(), refused, 2).contains("eigenvalue"));
+    let checked = json(folder.path(), "verify refused.json", 2);
+    assert_eq!(checked[0]["claims"][0]["verdict"], "refused");
+}
+
+#[test]
+fn a_scenario_gives_certify_its_family() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = "certify --robot panda --gains pezzato2020-simulation --scenario pick-and-place --claim exponential";
+    let made = json(folder.path(), arguments, 0);
+    assert_eq!(made["family"]["payload_kg"][1], 0.7);
+    assert!(made["claims"][0]["statement"].as_str().unwrap().contains("0 to 0.7 kg"));
+}
+
+#[test]
+fn lists_name_what_is_built_in() {
+    let folder = tempfile::tempdir().unwrap();
+    for (command, name) in [("robots", "panda-cuboid"), ("presets", "pezzato2020-robot"), ("scenarios", "payload-swap")] {
+        assert!(stdout(folder.path(), command, 0).contains(name));
+        let entries = json(folder.path(), command, 0);
+        let entries = entries.as_array().unwrap();
+        assert!(entries.iter().any(|entry| entry["name"] == name));
+        assert!(entries.iter().all(|entry| !entry["description"].as_str().unwrap().is_empty()));
+    }
+}

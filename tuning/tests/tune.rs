@@ -1,0 +1,80 @@
+//! The main command: its four files, the same for any number of threads, and what it leaves when nothing is certified.
+
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod common;
+
+use std::path::Path;
+
+use common::{SHORT, json, stdout};
+
+fn read(path: impl AsRef<Path>) -> String {
+    std::fs::read_to_string(path).unwrap()
+}
+
+fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let mut names: Vec<_> = entries.collect();
+    names.sort();
+    names
+}
+
+const FILES: [&str; 4] = ["certificate.json", "gains.toml", "report.html", "run.json"];
+
+#[test]
+fn a_run_is_the_same_to_the_byte_for_any_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("short.toml"), SHORT).unwrap();
+    let one = json(folder.path(), "tune --robot panda --scenario short.toml --budget 8 --seed 3 --threads 1 --out one", 0);
+    // The default command is `tune`.
+    let two = json(folder.path(), "--robot panda --scenario short.toml --budget 8 --seed 3 --threads 2 --out two", 0);
+    assert_eq!(names(&at("one")), FILES);
+    assert_eq!(names(&at("two")), FILES);
+    for name in ["gains.toml", "run.json", "certificate.json"] {
+        assert!(read(at("one").join(name)) == read(at("two").join(name)), "{name} differs");
+    }
+    assert_eq!(one["gains"], two["gains"]);
+    assert_eq!(one["certified"], true);
+    let cost = |side: &str| one["held_out"][side]["cost_s"].as_f64().unwrap();
+    assert!(cost("tuned") <= cost("published"));
+
+    let record = read(at("one").join("run.json"));
+    for word in [folder.path().to_str().unwrap(), "elapsed", "threads", "short.toml"] {
+        assert!(!record.contains(word), "run.json holds `{word}`");
+    }
+    let gains = read(at("one").join("gains.toml"));
+    assert!(gains.contains("source = ") && gains.contains("seed 3") && gains.contains("scenario short"), "{gains}");
+
+    stdout(folder.path(), "verify one/certificate.json two/certificate.json", 0);
+    let simulate = "simulate --robot panda --gains one/gains.toml --scenario short.toml";
+    assert!(json(folder.path(), simulate, 0)["diverged_at_s"].is_null());
+
+    // The page can be made again from the folder alone.
+    let page = read(at("one").join("report.html"));
+    assert!(page.starts_with("<!doctype html>") && page.len() < 2_000_000);
+    std::fs::remove_file(at("one").join("report.html")).unwrap();
+    stdout(folder.path(), "report one", 0);
+    assert!(read(at("one").join("report.html")) == page, "`report` makes another page than `tune`");
+}
+
+#[test]
+fn without_a_certificate_there_are_no_gains() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    // Gravity held by the controller with little integral action, and no friction: no claim about the region holds.
+    let scenario = SHORT.replace("gravity_compensation = true", "gravity_compensation = false").replace("[0.5, 2]", "[0, 0]");
+    std::fs::write(at("hard.toml"), scenario).unwrap();
+    std::fs::create_dir(at("out")).unwrap();
+    std::fs::write(at("out").join("gains.toml"), "of an earlier run").unwrap();
+    std::fs::write(at("out").join("notes.txt"), "mine").unwrap();
+    let run = json(folder.path(), "--robot panda --scenario hard.toml --budget 2 --out out", 2);
+    assert_eq!(run["certified"], false);
+    assert!(run["gains"].is_null());
+    let left = names(&at("out"));
+    assert!(left.contains(&"run.json".to_owned()) && left.contains(&"report.html".to_owned()), "{left:?}");
+    assert!(!left.contains(&"gains.toml".to_owned()), "an earlier run's gains would be taken for this one's");
+    assert_eq!(read(at("out").join("notes.txt")), "mine");
+    assert!(read(at("out").join("report.html")).contains("No candidate was certified"));
+    stdout(folder.path(), "report out", 2);
+}
