@@ -1,1 +1,81 @@
-//! The claims that CI re-derives.
+//! The claims that CI derives again, on the Panda with the published gains.
+//!
+//! Each claim is three files of one name: `claims/<name>.md` (statement, assumptions, derivation, source), `tests/<name>.rs`, and
+//! `certificates/<name>.json`. `cargo xtask claims` writes the certificates again.
+#![forbid(unsafe_code)]
+
+use std::path::{Path, PathBuf};
+
+use certune::certify::{Claims, FamilyValues};
+use certune::closed_loop::{FileError, Gains, GainsFile, KeyError};
+use certune::dynamics::Robot;
+use certune::verify::{Certificate, Rejection, VerifyError};
+use certune::{ArmCertifier, StabilityError, certificate_text};
+
+/// Why a claim could not be derived or compared.
+#[derive(Debug, thiserror::Error)]
+pub enum ProofError {
+    /// The preset is broken.
+    #[error(transparent)]
+    Preset(#[from] FileError),
+    /// The preset does not fit a Panda.
+    #[error(transparent)]
+    Gains(#[from] KeyError),
+    /// The preset is for another controller.
+    #[error("the preset is not for the AIC")]
+    Controller,
+    /// The certificate could not be made.
+    #[error(transparent)]
+    Stability(#[from] StabilityError),
+    /// The stored certificate is missing or cannot be written.
+    #[error("{path}: {source} (write it with `cargo xtask claims`)")]
+    Stored {
+        /// The file.
+        path: PathBuf,
+        /// The failure.
+        source: std::io::Error,
+    },
+    /// The stored certificate cannot be read.
+    #[error(transparent)]
+    Unreadable(#[from] VerifyError),
+    /// The stored certificate is rejected.
+    #[error(transparent)]
+    Rejected(#[from] Rejection),
+}
+
+/// The Panda with hand, nominal masses, no payload and no rotor inertia.
+pub fn nominal_family(gravity_compensation: bool, friction_n_m_s_per_rad: [f64; 2]) -> FamilyValues {
+    FamilyValues {
+        gravity_compensation,
+        friction_n_m_s_per_rad,
+        mass_uncertainty: 0.0,
+        payload_kg: [0.0, 0.0],
+        rotor_inertia_kg_m2: [0.0, 0.0],
+    }
+}
+
+/// The claims about the gains of the authors' released simulation, derived now.
+///
+/// # Errors
+/// [`ProofError`] when the preset or the arm is broken.
+pub fn published(family: &FamilyValues, claims: Claims) -> Result<Certificate, ProofError> {
+    let text = include_str!("../../tuning/presets/pezzato2020-simulation.toml");
+    let file = GainsFile::parse(Path::new("pezzato2020-simulation.toml"), text)?;
+    let Gains::Aic(table) = file.gains else { return Err(ProofError::Controller) };
+    let gains = table.bind::<7>()?;
+    Ok(ArmCertifier::new(&Robot::panda(), family)?.certify(&gains, claims)?)
+}
+
+/// The stored certificate of a claim, checked; written first when `CERTUNE_WRITE_CLAIMS` is set.
+///
+/// # Errors
+/// [`ProofError`] when the file is missing, unreadable or rejected.
+pub fn stored(name: &str, derived: &Certificate) -> Result<Certificate, ProofError> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("certificates").join(name).with_extension("json");
+    let failed = |source| ProofError::Stored { path: path.clone(), source };
+    if std::env::var_os("CERTUNE_WRITE_CLAIMS").is_some() {
+        std::fs::write(&path, certificate_text(derived)?).map_err(failed)?;
+    }
+    let text = std::fs::read_to_string(&path).map_err(failed)?;
+    Ok(certune::verify::verify(&text)??)
+}

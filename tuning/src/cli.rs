@@ -15,7 +15,7 @@ use crate::output;
 
 const AFTER_HELP: &str = "\
 Examples:
-  autotune --robot panda                            tune, certify and report, in about a minute
+  autotune --robot panda                            tune, certify and report, in under a minute
   autotune certify --robot panda --gains pezzato2020-simulation
   autotune verify runs/panda-aic-1/certificate.json
   autotune presets                                  what --gains knows by name
@@ -104,7 +104,7 @@ pub struct TuneArgs {
     /// Scenario by name or TOML file [default: pick-and-place; for a URDF file a generic one]
     #[arg(long, value_name = "NAME|FILE")]
     pub scenario: Option<String>,
-    /// Candidates to evaluate [default: 150]
+    /// Candidates to evaluate [default: 100]
     #[arg(long, value_name = "N")]
     pub budget: Option<usize>,
     /// Seed of every random draw [default: 1]

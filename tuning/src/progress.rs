@@ -1,14 +1,15 @@
 //! How a run is coming along: bars on stderr with rate and time left, nothing when stderr is no terminal.
 
+use std::fmt::Write;
 use std::time::{Duration, Instant};
 
 use certune::tune::{Evaluation, Outcome, Progress, Stage, TuneProgress};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use crate::output;
 
 const SPINNER: &str = "  {spinner} {msg}";
-const BAR: &str = "  search {bar:32} {pos}/{len} candidates, {per_sec}, {eta} left, {msg}";
+const BAR: &str = "  search {bar:32} {pos}/{len} candidates, {rate}, {eta} left, {msg}";
 
 /// One line on a terminal, redrawn; with `verbose`, lines that stay as well.
 pub struct Terminal {
@@ -50,7 +51,11 @@ impl Terminal {
 
 /// The template is a constant; should it not parse, a plain bar does as well.
 fn style(template: &str) -> ProgressStyle {
-    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+    let rate = |state: &ProgressState, text: &mut dyn Write| {
+        // A text that cannot be written to is nobody to tell.
+        let _ = write!(text, "{:.1}/s", state.per_sec());
+    };
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()).with_key("rate", rate)
 }
 
 /// An outcome in words.

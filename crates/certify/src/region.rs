@@ -19,14 +19,16 @@ use crate::problem::Problem;
 pub struct RegionOptions {
     /// The decay rate that the region must have, 1/s; a larger one shrinks the ball.
     pub rate_per_s: f64,
-    /// Evaluations of the line search after its coarse grid.
+    /// Points of the line search's coarse grid, at least 1.
+    pub coarse: usize,
+    /// Evaluations of the line search after that.
     pub refinements: usize,
 }
 
 impl Default for RegionOptions {
-    /// A rate of 0.01 per s, 8 refinements.
+    /// A rate of 0.01 per s, 9 points and 8 refinements.
     fn default() -> Self {
-        Self { rate_per_s: 0.01, refinements: 8 }
+        Self { rate_per_s: 0.01, coarse: 9, refinements: 8 }
     }
 }
 
@@ -231,7 +233,7 @@ pub fn region(problem: &Problem, options: &RegionOptions) -> Claim {
         Ok(x) if x[OBJECTIVE] > 0.0 => x[OBJECTIVE].sqrt().recip(),
         Ok(_) | Err(SolveError::Infeasible | SolveError::Unbounded | SolveError::Stopped(_)) => 0.0,
     };
-    let Some(rho) = best_rho(radius, options.refinements) else {
+    let Some(rho) = best_rho(radius, options) else {
         return not_proved(
             "the inequalities were not satisfied for any bound on y that was tried, and no counterexample was searched"
                 .to_owned(),
@@ -253,19 +255,25 @@ pub fn region(problem: &Problem, options: &RegionOptions) -> Claim {
 
 /// Margins by which the inequalities are tightened, in turn.
 const STRICTNESS: [f64; 4] = [1e-7, 1e-6, 1e-5, 1e-4];
-const RHO_GRID: [f64; 9] = [0.003, 0.01, 0.03, 0.1, 0.2, 0.4, 0.8, 1.6, 5.0];
+/// Where the bound on |y| is searched.
+const RHO: [f64; 2] = [0.003, 5.0];
 
-/// A coarse grid, then golden sections in log rho around its best point. `None` when no point is feasible.
-fn best_rho(radius: impl Fn(f64) -> f64, refinements: usize) -> Option<f64> {
-    let values = RHO_GRID.map(&radius);
-    let best = (0..RHO_GRID.len()).max_by(|&i, &j| values[i].total_cmp(&values[j]))?;
+/// A coarse geometric grid, then golden sections in log rho around its best point. `None` when no point is feasible.
+fn best_rho(radius: impl Fn(f64) -> f64, options: &RegionOptions) -> Option<f64> {
+    let [first, last] = RHO.map(f64::ln);
+    let spacing = (last - first) / options.coarse.max(1) as f64;
+    let grid: Vec<f64> = (0..options.coarse.max(1)).map(|k| first + spacing * (k as f64 + 0.5)).collect();
+    let values: Vec<f64> = grid.iter().map(|log| radius(log.exp())).collect();
+    let best = (0..grid.len()).max_by(|&i, &j| values[i].total_cmp(&values[j]))?;
     if values[best] <= 0.0 {
         return None;
     }
     let golden = (5.0_f64.sqrt() - 1.0) / 2.0;
-    let mut low = RHO_GRID[best.saturating_sub(1)].ln();
-    let mut high = RHO_GRID[(best + 1).min(RHO_GRID.len() - 1)].ln();
-    let mut incumbent = (values[best], RHO_GRID[best]);
+    let mut incumbent = (values[best], grid[best].exp());
+    if options.refinements == 0 {
+        return Some(incumbent.1);
+    }
+    let (mut low, mut high) = (grid[best] - spacing, grid[best] + spacing);
     let inner = |low: f64, high: f64| (high - golden * (high - low), low + golden * (high - low));
     let (mut left, mut right) = inner(low, high);
     let (mut at_left, mut at_right) = (radius(left.exp()), radius(right.exp()));
@@ -333,7 +341,7 @@ impl Numbers {
     /// positive semidefinite, with V normalised to have trace 1 at the largest inertia. Positive: infeasible.
     fn distance(&self, rate: f64) -> Option<f64> {
         let t = OBJECTIVE;
-        let rho = RHO_GRID[0];
+        let rho = RHO[0];
         let mut cost = vec![0.0; VARIABLES];
         cost[t] = 1.0;
         let relaxed = |matrix: DMatrix<f64>, slack: f64| {

@@ -93,9 +93,16 @@ impl<D: TimeDomain> Loop<D> {
         self.a.nrows()
     }
 
-    /// All eigenvalues, with multiplicity, in no particular order.
+    /// All eigenvalues, with multiplicity, in no particular order; NaN throughout when the QR iteration does not converge,
+    /// which a comparison then counts as unstable.
     pub fn eigenvalues(&self) -> Vec<Complex<f64>> {
-        self.a.complex_eigenvalues().iter().copied().collect()
+        let order = self.order();
+        // faer bounds its number of iterations; nalgebra's Schur form does not, and loops for ever on some loops.
+        let a = faer::Mat::from_fn(order, order, |row, column| self.a[(row, column)]);
+        match a.eigenvalues_from_real() {
+            Ok(values) => values.into_iter().map(|s| Complex::new(s.re, s.im)).collect(),
+            Err(_) => vec![Complex::new(f64::NAN, f64::NAN); order],
+        }
     }
 }
 
@@ -138,7 +145,10 @@ impl Loop<Discrete> {
 
     /// The largest modulus of an eigenvalue: below 1 exactly when the loop is exponentially stable.
     pub fn spectral_radius(&self) -> f64 {
-        self.eigenvalues().into_iter().map(|s| s.norm()).fold(0.0, f64::max)
+        self.eigenvalues()
+            .into_iter()
+            .map(|s| s.norm())
+            .fold(0.0, |most, x| if x > most || x.is_nan() { x } else { most })
     }
 
     /// The decay rate `-ln(radius) / step`, in 1/s.
@@ -161,7 +171,7 @@ mod tests {
 
     #[test]
     fn sampling_a_decay_keeps_its_rate() {
-        let step_s = 0.01;
+        let step_s: f64 = 0.01;
         let sampled = Loop::discrete(dmatrix![(-3.0 * step_s).exp()], step_s).unwrap();
         assert!((sampled.decay_per_s() - 3.0).abs() < 1e-10);
     }
@@ -170,7 +180,10 @@ mod tests {
     fn what_is_no_loop_is_refused_with_its_reason() {
         assert_eq!(Loop::continuous(DMatrix::zeros(2, 3)), Err(LoopError::NotSquare { rows: 2, columns: 3 }));
         assert_eq!(Loop::continuous(DMatrix::zeros(0, 0)), Err(LoopError::Empty));
-        assert!(matches!(Loop::continuous(dmatrix![1.0, f64::NAN; 0.0, 1.0]), Err(LoopError::NotFinite { row: 0, column: 1, .. })));
+        assert!(matches!(
+            Loop::continuous(dmatrix![1.0, f64::NAN; 0.0, 1.0]),
+            Err(LoopError::NotFinite { row: 0, column: 1, .. })
+        ));
         assert!(matches!(Loop::discrete(dmatrix![0.5], 0.0), Err(LoopError::Step { .. })));
     }
 }

@@ -88,6 +88,9 @@ fn summary(claim: &Claim, checked: &Checked) -> ClaimSummary {
 pub fn claims_in_words(certificate: &Certificate, in_detail: bool) -> String {
     let mut text = String::new();
     for claim in summaries(certificate) {
+        if !text.is_empty() {
+            text.push('\n');
+        }
         let _ = write!(text, "{}: {}", claim.kind, claim.verdict);
         if let Some(grade) = claim.grade {
             let _ = write!(text, " ({grade})");
@@ -112,7 +115,7 @@ pub fn claims_in_words(certificate: &Certificate, in_detail: bool) -> String {
         }
     }
     if in_detail {
-        text.push_str("assumptions\n");
+        text.push_str("\nassumptions\n");
         for assumption in certificate.assumptions() {
             text.push_str(&wrapped(&format!("{}: {}", grade_word(assumption.grade), assumption.text), 2));
         }

@@ -24,7 +24,7 @@ use crate::progress::Terminal;
 use crate::run::{Folder, Run, RunFile};
 use crate::versions::versions;
 
-const DEFAULT_BUDGET: usize = 150;
+const DEFAULT_BUDGET: usize = 100;
 const DEFAULT_SEED: u64 = 1;
 /// Plants on which every candidate is simulated.
 const BATCH_PLANTS: usize = 8;

@@ -1,7 +1,5 @@
 //! Running the program in a folder of its own.
 
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
-
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;

@@ -1,10 +1,6 @@
 //! What each command prints, and its exit code, when nothing is wrong.
 
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
-
-mod common;
-
-use common::{autotune, json, stdout, urdf};
+use crate::common::{autotune, json, stdout, urdf};
 use serde_json::Value;
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -55,15 +51,19 @@ fn holding_torque_leaves_the_arm_at_rest() {
     let folder = tempfile::tempdir().unwrap();
     let gravity = json(folder.path(), "inspect --robot panda-bare --q 0.3,0.2,0.1,-1,0.5,1.2,0", 0);
     let tau: Vec<String> = numbers(&gravity["gravity_torque_n_m"]).iter().map(f64::to_string).collect();
-    let held =
-        json(folder.path(), &format!("inspect --robot panda-bare --q 0.3,0.2,0.1,-1,0.5,1.2,0 --tau={}", tau.join(",")), 0);
+    let held = json(
+        folder.path(),
+        &format!("inspect --robot panda-bare --q 0.3,0.2,0.1,-1,0.5,1.2,0 --tau={}", tau.join(",")),
+        0,
+    );
     assert!(numbers(&held["ddq_rad_per_s2"]).iter().all(|ddq| ddq.abs() < 1e-9));
 }
 
 #[test]
 fn simulate_reproduces_the_published_behaviour_and_writes_csv() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = "simulate --robot panda --gains pezzato2020-simulation --scenario pick-and-place-paper --csv run.csv";
+    let arguments =
+        "simulate --robot panda --gains pezzato2020-simulation --scenario pick-and-place-paper --csv run.csv";
     let run = json(folder.path(), arguments, 0);
     assert!(run["diverged_at_s"].is_null());
     let segments = run["segments"].as_array().unwrap();
@@ -100,7 +100,7 @@ fn simulate_runs_every_preset_and_another_arm() {
 #[test]
 fn a_run_that_diverges_says_so() {
     let folder = tempfile::tempdir().unwrap();
-    let preset = include_str!("../presets/pezzato2020-simulation.toml").replace("sigma_dq = 1.0", "sigma_dq = 5.0");
+    let preset = include_str!("../../presets/pezzato2020-simulation.toml").replace("sigma_dq = 1.0", "sigma_dq = 5.0");
     std::fs::write(folder.path().join("fast.toml"), preset).unwrap();
     let arguments = "simulate --robot panda --gains fast.toml --scenario pick-and-place-paper";
     assert!(json(folder.path(), arguments, 0)["diverged_at_s"].as_f64().is_some_and(|at_s| at_s > 0.0));
@@ -114,7 +114,8 @@ fn what_certify_writes_verify_accepts() {
     let made = json(folder.path(), exponential, 0);
     assert!(made["claims"][0]["rate_per_s"].as_f64().unwrap() >= 0.7);
     assert_eq!(made["claims"][0]["grade"], "conditional");
-    let region = "certify --robot panda --gains pezzato2020-simulation --claim region --gravity-compensation on --out b.json";
+    let region =
+        "certify --robot panda --gains pezzato2020-simulation --claim region --gravity-compensation on --out b.json";
     let without = json(folder.path(), region, 0);
     assert!(without["claims"][0]["radius_rad"].as_f64().unwrap() >= 0.33);
     let with = json(folder.path(), &format!("{region} --friction 1..3"), 0);
@@ -139,7 +140,8 @@ fn a_refusal_exits_with_2_and_verifies_as_one() {
 #[test]
 fn a_scenario_gives_certify_its_family() {
     let folder = tempfile::tempdir().unwrap();
-    let arguments = "certify --robot panda --gains pezzato2020-simulation --scenario pick-and-place --claim exponential";
+    let arguments =
+        "certify --robot panda --gains pezzato2020-simulation --scenario pick-and-place --claim exponential";
     let made = json(folder.path(), arguments, 0);
     assert_eq!(made["family"]["payload_kg"][1], 0.7);
     assert!(made["claims"][0]["statement"].as_str().unwrap().contains("0 to 0.7 kg"));
@@ -148,7 +150,8 @@ fn a_scenario_gives_certify_its_family() {
 #[test]
 fn lists_name_what_is_built_in() {
     let folder = tempfile::tempdir().unwrap();
-    for (command, name) in [("robots", "panda-cuboid"), ("presets", "pezzato2020-robot"), ("scenarios", "payload-swap")] {
+    for (command, name) in [("robots", "panda-cuboid"), ("presets", "pezzato2020-robot"), ("scenarios", "payload-swap")]
+    {
         assert!(stdout(folder.path(), command, 0).contains(name));
         let entries = json(folder.path(), command, 0);
         let entries = entries.as_array().unwrap();

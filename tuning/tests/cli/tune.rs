@@ -1,12 +1,8 @@
 //! The main command: its four files, the same for any number of threads, and what it leaves when nothing is certified.
 
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
-
-mod common;
-
 use std::path::Path;
 
-use common::{SHORT, json, stdout};
+use crate::common::{SHORT, json, stdout};
 
 fn read(path: impl AsRef<Path>) -> String {
     std::fs::read_to_string(path).unwrap()
@@ -26,7 +22,8 @@ fn a_run_is_the_same_to_the_byte_for_any_number_of_threads() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("short.toml"), SHORT).unwrap();
-    let one = json(folder.path(), "tune --robot panda --scenario short.toml --budget 8 --seed 3 --threads 1 --out one", 0);
+    let one =
+        json(folder.path(), "tune --robot panda --scenario short.toml --budget 8 --seed 3 --threads 1 --out one", 0);
     // The default command is `tune`.
     let two = json(folder.path(), "--robot panda --scenario short.toml --budget 8 --seed 3 --threads 2 --out two", 0);
     assert_eq!(names(&at("one")), FILES);
@@ -58,23 +55,42 @@ fn a_run_is_the_same_to_the_byte_for_any_number_of_threads() {
     assert!(read(at("one").join("report.html")) == page, "`report` makes another page than `tune`");
 }
 
-#[test]
-fn without_a_certificate_there_are_no_gains() {
+/// A folder with an earlier run's gains and a file of the user's; a run in it that certifies nothing.
+fn uncertified(payload_kg: &str, budget: usize) -> (tempfile::TempDir, serde_json::Value) {
     let folder = tempfile::tempdir().unwrap();
-    let at = |name: &str| folder.path().join(name);
-    // Gravity held by the controller with little integral action, and no friction: no claim about the region holds.
-    let scenario = SHORT.replace("gravity_compensation = true", "gravity_compensation = false").replace("[0.5, 2]", "[0, 0]");
-    std::fs::write(at("hard.toml"), scenario).unwrap();
-    std::fs::create_dir(at("out")).unwrap();
-    std::fs::write(at("out").join("gains.toml"), "of an earlier run").unwrap();
-    std::fs::write(at("out").join("notes.txt"), "mine").unwrap();
-    let run = json(folder.path(), "--robot panda --scenario hard.toml --budget 2 --out out", 2);
+    let out = folder.path().join("out");
+    // Gravity held by the controller, no friction, and loads of which the published gains know nothing.
+    let scenario = SHORT
+        .replace("gravity_compensation = true", "gravity_compensation = false")
+        .replace("[0.5, 2]", "[0, 0]")
+        .replace("[0, 0.7]", payload_kg);
+    std::fs::write(folder.path().join("hard.toml"), scenario).unwrap();
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("gains.toml"), "of an earlier run").unwrap();
+    std::fs::write(out.join("notes.txt"), "mine").unwrap();
+    let line = format!("--robot panda --scenario hard.toml --budget {budget} --out out");
+    let run = json(folder.path(), &line, 2);
     assert_eq!(run["certified"], false);
     assert!(run["gains"].is_null());
-    let left = names(&at("out"));
-    assert!(left.contains(&"run.json".to_owned()) && left.contains(&"report.html".to_owned()), "{left:?}");
-    assert!(!left.contains(&"gains.toml".to_owned()), "an earlier run's gains would be taken for this one's");
-    assert_eq!(read(at("out").join("notes.txt")), "mine");
-    assert!(read(at("out").join("report.html")).contains("No candidate was certified"));
+    assert_eq!(read(out.join("notes.txt")), "mine");
+    assert!(read(out.join("report.html")).contains("No candidate was certified"));
     stdout(folder.path(), "report out", 2);
+    (folder, run)
+}
+
+#[test]
+fn without_a_certificate_there_are_no_gains() {
+    let (folder, run) = uncertified("[0, 4]", 2);
+    // An earlier run's gains would be taken for this one's.
+    assert_eq!(names(&folder.path().join("out")), ["certificate.json", "notes.txt", "report.html", "run.json"]);
+    assert_eq!(run["claims"][1]["verdict"], "not proved");
+    // What the file says is checked, and is no success.
+    stdout(folder.path(), "verify out/certificate.json", 2);
+}
+
+#[test]
+fn without_a_stable_candidate_there_is_no_claim_either() {
+    let (folder, run) = uncertified("[0, 20]", 1);
+    assert_eq!(names(&folder.path().join("out")), ["notes.txt", "report.html", "run.json"]);
+    assert_eq!(run["claims"].as_array().map(Vec::len), Some(0));
 }

@@ -1,0 +1,8 @@
+//! The program as its users meet it: command lines in, text, files and exit codes out.
+
+#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+
+mod bad_input;
+mod commands;
+mod common;
+mod tune;
