@@ -91,6 +91,9 @@ pub enum Error {
     /// A readable certificate that a run cannot rest on.
     #[error("{}: the certificate is rejected: {source}", path.display())]
     Rejected { path: PathBuf, source: certune::verify::Rejection },
+    /// A folder without a file that every run has.
+    #[error("cannot read {}: {source}", path.display())]
+    NoRun { path: PathBuf, source: io::Error },
     /// A run's record that is none.
     #[error("{}: not the record of a run: {source}", path.display())]
     RunRecord { path: PathBuf, source: serde_json::Error },
@@ -146,7 +149,7 @@ impl Error {
             Self::Io { action: "write", .. } => Some("another place that you may write to".to_owned()),
             Self::Certificate { .. } => Some("the certificate.json of a run, whole and unedited".to_owned()),
             Self::Rejected { .. } => Some("the certificate.json that the run wrote, or repeat the run".to_owned()),
-            Self::RunRecord { .. } | Self::RunInconsistent { .. } => {
+            Self::NoRun { .. } | Self::RunRecord { .. } | Self::RunInconsistent { .. } => {
                 Some("a folder that `autotune tune` wrote".to_owned())
             }
             Self::OtherRobot { .. } | Self::RobotOfRun { .. } => {

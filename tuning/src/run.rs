@@ -62,7 +62,8 @@ impl Folder {
     /// Reads `run.json` and `certificate.json`, which is checked, not believed.
     pub fn read(&self) -> Result<Run, Error> {
         let path = self.record();
-        let file = RunFile::parse(&path, &output::read_file(&path)?)?;
+        let text = std::fs::read_to_string(&path).map_err(|source| Error::NoRun { path: path.clone(), source })?;
+        let file = RunFile::parse(&path, &text)?;
         let path = self.certificate();
         let certificate = match output::read_file(&path) {
             Err(Error::Io { source, .. })

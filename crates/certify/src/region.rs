@@ -277,7 +277,7 @@ fn best_rho(radius: impl Fn(f64) -> f64, options: &RegionOptions) -> Option<f64>
     let inner = |low: f64, high: f64| (high - golden * (high - low), low + golden * (high - low));
     let (mut left, mut right) = inner(low, high);
     let (mut at_left, mut at_right) = (radius(left.exp()), radius(right.exp()));
-    for _ in 0..refinements {
+    for _ in 0..options.refinements {
         for (value, at) in [(at_left, left), (at_right, right)] {
             if value > incumbent.0 {
                 incumbent = (value, at.exp());

@@ -49,6 +49,10 @@ pub use certune_report as report;
 pub use certune_tune as tune;
 pub use certune_verify as verify;
 
+/// How the workspace is laid out, what its names mean, and what a claim is worth.
+#[doc = include_str!("_docs/architecture.md")]
+pub mod guide {}
+
 mod stability;
 
 pub use stability::{ArmCertifier, Effort, StabilityError, certificate_text, family_of, poles_per_s};

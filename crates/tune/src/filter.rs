@@ -92,22 +92,13 @@ impl<const N: usize> StabilityFilter<N> {
         let compensated = self.gravity_compensation;
         let growth = |FilterSample { model, q }: &FilterSample<N>| {
             let continuous = linearise_aic(model, q, params, compensated)
-                .map_or(f64::INFINITY, |found| largest(found.matrix(), |s| s.re));
+                .map_or(f64::INFINITY, |found| found.spectral_abscissa_per_s());
             let sampled = linearise_aic_sampled(model, q, params, compensated, self.delay_samples)
-                .map_or(f64::INFINITY, |found| largest(found.matrix(), |z| z.re.hypot(z.im)).ln() / found.step_s());
+                .map_or(f64::INFINITY, |found| -found.decay_per_s());
             Finite::saturating(continuous).max(Finite::saturating(sampled))
         };
         self.samples.par_iter().map(growth).max().unwrap_or(Finite::saturating(f64::NEG_INFINITY))
     }
-}
-
-/// The largest `size` of an eigenvalue of `matrix`; infinity if the iteration does not converge.
-fn largest(matrix: &nalgebra::DMatrix<f64>, size: fn(&faer::c64) -> f64) -> f64 {
-    let matrix = faer::Mat::from_fn(matrix.nrows(), matrix.ncols(), |row, column| matrix[(row, column)]);
-    // LAPACK's algorithm with a bound on its iterations; nalgebra's runs forever on some sampled loops, whose eigenvalues crowd at 1.
-    matrix
-        .eigenvalues_from_real()
-        .map_or(f64::INFINITY, |values| values.iter().map(size).fold(f64::NEG_INFINITY, f64::max))
 }
 
 /// The lightest (`end` = 0) or heaviest (1) plant of the box, with its least friction.

@@ -8,7 +8,8 @@ use certune::closed_loop::Scenario;
 use certune::dynamics::{Robot, for_joint_count};
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::{
-    AicObjective, Batch, Bench, Gains, HeldOut, Question, SearchError, SearchSettings, Space, TuneError, Tuned, tune,
+    AicObjective, Batch, BatchError, Bench, Gains, HeldOut, Question, SearchError, SearchSettings, Space, TuneError,
+    Tuned, tune,
 };
 use certune::verify::{Certificate, Claim, Verdict};
 use certune::{ArmCertifier, StabilityError, family_of};
@@ -72,6 +73,7 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
         .num_threads(threads)
         .build()
         .map_err(|source| Error::Threads { threads, source })?;
+    let existed = plan.folder.path.exists();
     output::prepare_folder(&plan.folder.path)?;
     let progress = Terminal::new(context.verbose);
     let outcome = pool.install(|| {
@@ -79,6 +81,10 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
             .unwrap_or_else(|| Err(catalogue::too_many_joints(&plan.robot)))
     });
     progress.finish();
+    if outcome.is_err() && !existed {
+        // Only a folder that is empty goes; what keeps it from going is no part of the message.
+        let _ = std::fs::remove_dir(&plan.folder.path);
+    }
     let (run, page) = outcome?;
     let files = plan.folder.write(&run, &page)?;
     let certified = run.file.record.winner.is_some();
@@ -158,8 +164,15 @@ fn run_name(robot: &Robot, controller: &str, seed: u64) -> String {
 fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, String), Error> {
     let Plan { robot, scenario, question, .. } = plan;
     let seed = question.search.seed;
-    let objective = AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES)?;
-    let judge = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants)?;
+    let misfit = |error| match error {
+        BatchError::Task(source) => {
+            Error::ScenarioFit { scenario: scenario.name.clone(), robot: robot.name().to_owned(), source }
+        }
+        BatchError::NoPlants | BatchError::Plant(_) => Error::Batch(error),
+    };
+    let objective =
+        AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
+    let judge = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants).map_err(misfit)?;
     progress.begin("sampling the arm's constants");
     let certifier = ArmCertifier::<N>::new(robot, &plan.family)?;
     let bench = Bench { objective: &objective, judge: &judge, progress };
@@ -266,10 +279,15 @@ fn in_words(plan: &Plan, run: &Run, files: &[PathBuf], elapsed_s: f64) -> String
     match (record.winner(), &run.certificate) {
         (Some(_), Some(certificate)) => text.push_str(&claims_in_words(certificate, false)),
         (_, refusal) => {
-            let _ = writeln!(
-                text,
-                "NOT CERTIFIED: none of the {} candidates brought before the certifier holds both claims; no gains.toml was written.",
-                record.certification.len()
+            let reason = match record.certification.len() {
+                0 => "no candidate was stable and finished the task on every plant, so none came before the certifier"
+                    .to_owned(),
+                1 => "the candidate brought before the certifier does not hold both claims".to_owned(),
+                count => format!("none of the {count} candidates brought before the certifier holds both claims"),
+            };
+            text.push_str(&output::wrapped(&format!("NOT CERTIFIED: {reason}; no gains.toml was written."), 0));
+            text.push_str(
+                "  try: more friction, a smaller payload or gravity compensation in the scenario's plant box\n\n",
             );
             if let Some(refusal) = refusal {
                 let _ = writeln!(text, "The best of them:");

@@ -124,8 +124,6 @@ fn plant_box_rows(plants: &PlantBox) -> Vec<RangeRow> {
         upper,
         unit: unit.to_owned(),
     };
-    let gravity =
-        if plants.gravity_compensation { "gravity compensated (1 = yes)" } else { "gravity compensated (0 = no)" };
     let switch = f64::from(u8::from(plants.gravity_compensation));
     vec![
         row("link masses over nominal", [1.0 - plants.mass_uncertainty, 1.0 + plants.mass_uncertainty], ""),
@@ -133,7 +131,7 @@ fn plant_box_rows(plants: &PlantBox) -> Vec<RangeRow> {
         row("viscous friction", plants.friction_n_m_s_per_rad, "N m s/rad"),
         row("rotor inertia", plants.rotor_inertia_kg_m2, "kg m²"),
         row("delay", plants.delay_samples.map(|samples| samples as f64), "samples"),
-        row(gravity, [switch; 2], ""),
+        row("gravity compensation by the arm", [switch; 2], "1 on, 0 off"),
     ]
 }
 

@@ -6,6 +6,7 @@ use certune::closed_loop::{
 use certune::control::aic::{Aic, AicParams, AicState};
 use certune::dynamics::{Joints, Robot};
 use certune::report::{Bands, HeldOut, Pair, PlantRow, Response, SegmentMetrics, SegmentRow, Trajectory as Curves};
+use certune::tune::streams::FIRST_HELD_OUT_PLANT;
 use certune::tune::{Batch, Gains, PlantResult, Verdict, score};
 use rayon::prelude::*;
 
@@ -85,7 +86,7 @@ pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Re
         held_out: HeldOut {
             plants: plants
                 .map(|((index, _), (published, tuned))| PlantRow {
-                    index: *index,
+                    index: index - FIRST_HELD_OUT_PLANT + 1,
                     in_words: in_words(&scenario.plant_box.draw(N, seed, *index)),
                     cost: Pair { published, tuned },
                 })

@@ -1,0 +1,76 @@
+//! Better gains than the published ones, in seconds, and certified: search, certify, judge.
+//!
+//! `cargo run --release -p examples --example 03_tune`
+
+use std::collections::BTreeMap;
+use std::error::Error;
+use std::path::Path;
+
+use certune::certify::Claims;
+use certune::closed_loop::{Gains as GainsTable, GainsFile, Scenario};
+use certune::dynamics::Robot;
+use certune::tune::{AicObjective, Batch, Bench, Gains, Outcome, Question, SearchSettings, Space, tune};
+use certune::{ArmCertifier, family_of};
+
+/// Runs the story.
+///
+/// # Errors
+/// When a shipped file is broken, or nothing was certified.
+pub fn main() -> Result<(), Box<dyn Error>> {
+    let robot = Robot::panda();
+    let file = Path::new("tuning/scenarios/pick-and-place.toml");
+    let scenario = Scenario::parse(file, include_str!("../tuning/scenarios/pick-and-place.toml"))?;
+    let file = Path::new("tuning/spaces/panda-aic.toml");
+    let space = Space::parse(file, include_str!("../tuning/spaces/panda-aic.toml"))?;
+    let file = Path::new("tuning/presets/pezzato2020-simulation.toml");
+    let preset = GainsFile::parse(file, include_str!("../tuning/presets/pezzato2020-simulation.toml"))?;
+    let GainsTable::Aic(table) = &preset.gains else { return Err("the preset is of another controller".into()) };
+    let published = Gains::from_table(table)?;
+
+    // Twenty candidates, two plants of the box; a real run has 150 and 8.
+    let (seed, evaluations) = (1, 20);
+    let question = Question {
+        robot: robot.name().to_owned(),
+        robot_sha256: robot.sha256(),
+        scenario: scenario.name.clone(),
+        versions: BTreeMap::from([("certune".to_owned(), env!("CARGO_PKG_VERSION").to_owned())]),
+        search: SearchSettings::new(space.method(), evaluations, seed),
+        batch_plants: 2,
+        held_out_plants: 4,
+        certification_attempts: 4,
+    };
+    // The search meets the first plants of the seed behind a filter of 16 linearised loops; the judge has plants that no candidate has met.
+    let objective = AicObjective::<7>::new(&robot, &scenario, seed, question.batch_plants, 16)?;
+    let judge = Batch::<7>::held_out(&robot, &scenario, seed, question.held_out_plants)?;
+    let bench = Bench { objective: &objective, judge: &judge, progress: &() };
+
+    // What "certified" means is decided here: every claim, for the whole plant box.
+    let certifier = ArmCertifier::<7>::new(&robot, &family_of(&scenario.plant_box)?)?;
+    let certify = |gains: &Gains| match certifier.certify(&gains.on_every_joint(), Claims::All) {
+        Ok(certificate) if certificate.all_hold() => Ok(certificate),
+        Ok(_) => Err("a claim does not hold".to_owned()),
+        Err(error) => Err(error.to_string()),
+    };
+    let tuned = tune(question, &space, Some(&published), bench, certify)?;
+
+    let record = &tuned.record;
+    let winner = record.winner().ok_or("nothing was certified")?;
+    let certificate = tuned.certificate.ok_or("a winner has its certificate")?;
+    let cost = |outcome: Outcome| outcome.cost_s().ok_or("a run without a cost");
+    let start_s = cost(record.start().ok_or("the published gains are evaluated first")?.outcome)?;
+    let winner_s = cost(winner.outcome)?;
+    println!(
+        "{} candidates: cost {start_s:.3} s with the published gains, {winner_s:.3} s tuned",
+        record.evaluations.len()
+    );
+    println!("{:?}", winner.gains);
+    for claim in certificate.checked() {
+        println!("\n{}: {}", claim.kind, claim.statement);
+    }
+
+    assert!(certificate.all_hold());
+    assert!(matches!(winner.outcome, Outcome::Certified { .. }));
+    assert!(winner_s <= start_s, "the published gains are among the candidates");
+    assert!(record.held_out.tuned.is_some(), "plants that the search never met have judged it");
+    Ok(())
+}
