@@ -167,7 +167,7 @@ pub fn scenario(given: Option<&str>, robot: &Robot) -> Result<Scenario, Error> {
     };
     let scenario = scenario_file(given)?;
     if scenario.joints() != robot.joints() {
-        let source = KeyError::per_joint("start_rad", scenario.joints(), robot.joints());
+        let source = Box::new(KeyError::per_joint("start_rad", scenario.joints(), robot.joints()));
         return Err(Error::ScenarioFit { scenario: scenario.name, robot: robot.name().to_owned(), source });
     }
     Ok(scenario)

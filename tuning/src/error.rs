@@ -51,7 +51,7 @@ pub enum Error {
     Joints { robot: String, joints: usize, most: usize },
     /// A scenario that does not fit the robot.
     #[error("scenario `{scenario}` does not fit robot `{robot}`: {source}")]
-    ScenarioFit { scenario: String, robot: String, source: KeyError },
+    ScenarioFit { scenario: String, robot: String, source: Box<KeyError> },
     /// A plant that cannot be built.
     #[error("the plant is not valid: {0}")]
     Plant(#[from] PlantError),

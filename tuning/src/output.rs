@@ -102,16 +102,20 @@ fn cannot(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> E
 }
 
 impl Staged {
-    /// Writes `content` beside `path`; the file at `path` stays as it is.
+    /// Writes `content` beside `path`; the file at `path` stays as it is. A link is followed, so that it is the file that changes.
     pub fn write(path: &Path, content: &str) -> Result<Self, Error> {
-        let folder = match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            Some(_) | None => Path::new("."),
-        };
         let stage = || {
-            if path.is_dir() {
-                return Err(std::io::Error::from(ErrorKind::IsADirectory));
-            }
+            let target = match std::fs::metadata(path) {
+                Ok(there) if there.is_file() => std::fs::canonicalize(path)?,
+                Ok(there) if there.is_dir() => return Err(ErrorKind::IsADirectory.into()),
+                // A device or a pipe must never be replaced by a file.
+                Ok(_) => return Err(std::io::Error::other("not a regular file")),
+                Err(_) => path.to_path_buf(),
+            };
+            let folder = match target.parent() {
+                Some(folder) if !folder.as_os_str().is_empty() => folder,
+                Some(_) | None => Path::new("."),
+            };
             let mut builder = tempfile::Builder::new();
             builder.prefix(".autotune-");
             #[cfg(unix)]
@@ -123,10 +127,9 @@ impl Staged {
             let mut file = builder.tempfile_in(folder)?;
             file.write_all(content.as_bytes())?;
             file.as_file().sync_all()?;
-            Ok(file)
+            Ok(Self { file, path: target.clone() })
         };
-        let file = stage().map_err(cannot("write", path))?;
-        Ok(Self { file, path: path.to_path_buf() })
+        stage().map_err(cannot("write", path))
     }
 
     /// Puts the file in its place, over whatever was there.
@@ -136,8 +139,12 @@ impl Staged {
     }
 }
 
-/// Writes one file whole or not at all.
+/// Writes one file whole or not at all; into a device or a pipe (`/dev/stdout`) the content is simply written.
 pub fn write_file(path: &Path, content: &str) -> Result<(), Error> {
+    if std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        let write = || std::fs::OpenOptions::new().write(true).open(path)?.write_all(content.as_bytes());
+        return write().map_err(cannot("write", path));
+    }
     Staged::write(path, content)?.commit()
 }
 
@@ -199,5 +206,22 @@ mod tests {
         write_file(&path, "two").unwrap();
         assert_eq!(read_file(&path).unwrap(), "two");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_file_is_never_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let socket = folder.path().join("socket");
+        let _listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+        assert!(Staged::write(&socket, "x").is_err() && write_file(&socket, "x").is_err());
+        assert!(!std::fs::metadata(&socket).unwrap().is_file());
+
+        let (file, link) = (folder.path().join("file"), folder.path().join("link"));
+        std::fs::write(&file, "old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        write_file(&link, "new").unwrap();
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(read_file(&file).unwrap(), "new");
     }
 }

@@ -1,7 +1,7 @@
 //! The largest certified decay rate of the linearised loops, or a point of the box that contradicts stability.
 
 use certune_verify::{
-    Attained, BoxPoint, Claim, ClaimKind, Document, ExponentialClaim, Grade, LoopBox, NotProvedClaim, Number,
+    Attained, BoxPoint, Claim, ClaimKind, Document, ExponentialClaim, Grade, LoopBox, NotProvedClaim, Number, Reason,
     RefusedClaim, family_box, is_stable_at, loop_box_decays,
 };
 use num_rational::BigRational;
@@ -56,20 +56,19 @@ pub fn exponential(problem: &Problem, attain: &dyn Fn() -> Option<(UnstableLoop,
         Some(rate_per_s) => {
             Claim::Exponential(ExponentialClaim { statement: String::new(), grade: Grade::Conditional, rate_per_s })
         }
-        None => not_proved("the rate cannot be written".to_owned()),
+        None => not_proved(Reason::OutOfRange),
     }
 }
 
-fn not_proved(reason: String) -> Claim {
+fn not_proved(reason: Reason) -> Claim {
     Claim::NotProved(NotProvedClaim { statement: String::new(), of: ClaimKind::Exponential, distance: None, reason })
 }
 
 fn refuse(document: &Document, range: &LoopBox, attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>) -> Claim {
     let zero = BigRational::zero();
-    let reason = match loop_box_decays(document, &zero) {
-        Ok(()) => return not_proved("stable, but at no rate of at least 0.001 per s".to_owned()),
-        Err(reason) => reason,
-    };
+    if loop_box_decays(document, &zero).is_ok() {
+        return not_proved(Reason::TooSlow);
+    }
     let unstable = |point: &BoxPoint| {
         let values =
             [&point.inertia_kg_m2, &point.friction_n_m_s_per_rad, &point.stiffness_n_m_per_rad].map(Number::value);
@@ -79,18 +78,19 @@ fn refuse(document: &Document, range: &LoopBox, attain: &dyn Fn() -> Option<(Uns
         Claim::Refused(Box::new(RefusedClaim { statement: String::new(), rate_per_s: Number::zero(), point, attained }))
     };
     if document.gains.shared_by_all().is_err() {
-        return not_proved(reason);
+        return not_proved(Reason::UnequalGains);
     }
     if let Some((found, attained)) = attain()
         && let Some(point) = as_point(found.inertia_kg_m2, found.friction_n_m_s_per_rad, found.stiffness_n_m_per_rad)
             .map(|point| pulled_inside(point, range))
         && unstable(&point)
     {
-        return refused(point, Some(attained));
+        let friction_n_m_s_per_rad = point.friction_n_m_s_per_rad.clone();
+        return refused(point, Some(Attained { friction_n_m_s_per_rad, ..attained }));
     }
     match grid(range).find(unstable) {
         Some(point) => refused(point, None),
-        None => not_proved(format!("{reason}, and no unstable point was found in the box")),
+        None => not_proved(Reason::NoPointFound),
     }
 }
 
@@ -102,15 +102,14 @@ fn as_point(m: f64, d: f64, g: f64) -> Option<BoxPoint> {
     })
 }
 
-/// Rounding may have moved a coordinate just past an end: put it on the end.
+/// Rounding may have moved a coordinate just past an end: put it on the end. A point farther out stays where it is, and is
+/// then no point of the box: it contradicts the constants, and the caller must not hide that.
 fn pulled_inside(point: BoxPoint, range: &LoopBox) -> BoxPoint {
-    let pull = |x: Number, [lower, upper]: &[Number; 2]| {
-        if x.value() < lower.value() {
-            lower.clone()
-        } else if x.value() > upper.value() {
-            upper.clone()
-        } else {
-            x
+    let pull = |x: Number, ends: &[Number; 2]| {
+        let near = |end: &Number| (x.to_f64() - end.to_f64()).abs() <= 1e-9 * end.to_f64().abs();
+        match ends.iter().find(|end| near(end)) {
+            Some(end) => end.clone(),
+            None => x,
         }
     };
     BoxPoint {

@@ -3,7 +3,7 @@
 //! Gains are the decimals a person wrote: the shortest decimal of an `f64` is that text whenever it has at most 15 digits. Constants are
 //! rounded outward to four significant digits, so that the document is readable and no weaker assumption is stated than was sampled.
 
-use certune_verify::{AicGains, Arm, Constants, Document, Evidence, Family, Number};
+use certune_verify::{AicGains, Arm, Constants, Document, Evidence, Family, Number, SampledSet};
 
 /// Gains of the AIC, one number per joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +33,8 @@ pub struct ArmValues {
     pub joints: usize,
     /// SHA-256 of its description.
     pub sha256: String,
+    /// Where a payload sits in the frame of the last link, m.
+    pub payload_com_m: [f64; 3],
 }
 
 /// Which plants a problem is about.
@@ -44,7 +46,7 @@ pub struct FamilyValues {
     pub friction_n_m_s_per_rad: [f64; 2],
     /// Share by which link masses may differ from nominal.
     pub mass_uncertainty: f64,
-    /// Payload, `[least, largest]`, kg.
+    /// Payload, a point mass, `[least, largest]`, kg.
     pub payload_kg: [f64; 2],
     /// Rotor inertia of each joint, `[least, largest]`, kg m^2.
     pub rotor_inertia_kg_m2: [f64; 2],
@@ -63,8 +65,6 @@ pub struct SampledConstantValues {
     pub k_c_kg_m2: f64,
     /// Coriolis constant against `dq'M dq`.
     pub k_r: f64,
-    /// Which configurations were sampled, in words.
-    pub over: String,
     /// Share by which the constants were widened.
     pub margin: f64,
     /// Configurations sampled.
@@ -76,9 +76,9 @@ pub struct SampledConstantValues {
 /// Why numbers make no problem.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ProblemError {
-    /// A number is NaN or infinite.
-    #[error("{quantity} is {value}, expected a finite number")]
-    NotFinite {
+    /// A number is NaN, infinite, or far too large or small.
+    #[error("{quantity} is {value}, expected a number that is 0 or between 1e-12 and 1e12 in size")]
+    NotRepresentable {
         /// Name of the quantity.
         quantity: &'static str,
         /// The number.
@@ -93,7 +93,8 @@ pub struct Problem {
 }
 
 fn number(quantity: &'static str, value: f64) -> Result<Number, ProblemError> {
-    Number::decimal(value).ok_or(ProblemError::NotFinite { quantity, value })
+    let sensible = value.abs() <= 0.0 || (1e-12..=1e12).contains(&value.abs());
+    sensible.then(|| Number::decimal(value)).flatten().ok_or(ProblemError::NotRepresentable { quantity, value })
 }
 
 fn numbers(quantity: &'static str, values: &[f64]) -> Result<Vec<Number>, ProblemError> {
@@ -104,21 +105,28 @@ fn interval(quantity: &'static str, [lower, upper]: [f64; 2]) -> Result<[Number;
     Ok([number(quantity, lower)?, number(quantity, upper)?])
 }
 
+fn coordinates([x, y, z]: [f64; 3]) -> Result<[Number; 3], ProblemError> {
+    let coordinate = |value| number("payload_com_m", value);
+    Ok([coordinate(x)?, coordinate(y)?, coordinate(z)?])
+}
+
 /// Four significant digits, moved up (`outward = 1`) or down (`outward = -1`) by one unit of the fourth.
 fn rounded(quantity: &'static str, value: f64, outward: f64) -> Result<Number, ProblemError> {
     if value <= 0.0 {
         return number(quantity, value);
     }
-    let unit = 10_f64.powf(value.log10().floor() - 3.0);
-    let text = format!("{:.3e}", (value / unit + outward).round() * unit);
-    text.parse().map_err(|_| ProblemError::NotFinite { quantity, value })
+    let decade = value.log10().floor() as i32 - 3;
+    let unit = 10_f64.powi(decade);
+    let digits = usize::try_from(-decade).unwrap_or(0);
+    let text = format!("{:.digits$}", (value / unit + outward).round() * unit);
+    text.parse().map_err(|_| ProblemError::NotRepresentable { quantity, value })
 }
 
 impl Problem {
     /// A problem from plain numbers.
     ///
     /// # Errors
-    /// [`ProblemError`] when a number is not finite. Whether gains are positive, intervals ordered and lists of the
+    /// [`ProblemError`] when a number cannot be written. Whether gains are positive, intervals ordered and lists of the
     /// right length is for the checker to say.
     pub fn new(
         arm: &ArmValues,
@@ -148,6 +156,7 @@ impl Problem {
                 friction_n_m_s_per_rad: interval("friction_n_m_s_per_rad", family.friction_n_m_s_per_rad)?,
                 mass_uncertainty: number("mass_uncertainty", family.mass_uncertainty)?,
                 payload_kg: interval("payload_kg", family.payload_kg)?,
+                payload_com_m: coordinates(arm.payload_com_m)?,
                 rotor_inertia_kg_m2: interval("rotor_inertia_kg_m2", family.rotor_inertia_kg_m2)?,
             },
             constants: Constants {
@@ -157,12 +166,13 @@ impl Problem {
                 k_c_kg_m2: rounded("k_c_kg_m2", constants.k_c_kg_m2, 1.0)?,
                 k_r: rounded("k_r", constants.k_r, 1.0)?,
                 evidence: Evidence::Sampled {
-                    over: constants.over.clone(),
+                    over: SampledSet::AllAngles,
                     margin: number("margin", constants.margin)?,
                     samples: constants.samples,
                     local_starts: constants.local_starts,
                 },
             },
+            about: String::new(),
             claims: Vec::new(),
             sha256: String::new(),
         };

@@ -7,7 +7,7 @@
 //! the torque's own size), without which the solver loses digits.
 
 use certune_verify::{
-    Claim, ClaimKind, Document, Grade, NotProvedClaim, Number, RegionClaim, RegionWitness, region_inequalities,
+    Claim, ClaimKind, Document, Grade, NotProvedClaim, Number, Reason, RegionClaim, RegionWitness, region_inequalities,
 };
 use nalgebra::{DMatrix, DVector, RowDVector};
 
@@ -222,11 +222,11 @@ fn entries(x: &[f64]) -> impl Iterator<Item = (usize, usize, f64)> {
 /// The claim `region` with the largest radius found, or "not proved".
 pub fn region(problem: &Problem, options: &RegionOptions) -> Claim {
     let document = problem.document();
-    if let Err(rejection) = document.gains.shared_by_all() {
-        return not_proved(rejection.to_string(), None);
+    if document.gains.shared_by_all().is_err() {
+        return not_proved(Reason::UnequalGains, None);
     }
     let Some(numbers) = Numbers::new(document) else {
-        return not_proved("the gains leave the range of floating point".to_owned(), None);
+        return not_proved(Reason::OutOfRange, None);
     };
     let rate = options.rate_per_s;
     let radius = |rho: f64| match numbers.solve(rho, rate, STRICTNESS[0]) {
@@ -234,11 +234,7 @@ pub fn region(problem: &Problem, options: &RegionOptions) -> Claim {
         Ok(_) | Err(SolveError::Infeasible | SolveError::Unbounded | SolveError::Stopped(_)) => 0.0,
     };
     let Some(rho) = best_rho(radius, options) else {
-        return not_proved(
-            "the inequalities were not satisfied for any bound on y that was tried, and no counterexample was searched"
-                .to_owned(),
-            numbers.distance(rate),
-        );
+        return not_proved(Reason::Infeasible, numbers.distance(rate));
     };
     // The optimum lies on the boundary of the inequalities: back off until the exact check passes.
     for strictness in STRICTNESS {
@@ -250,7 +246,7 @@ pub fn region(problem: &Problem, options: &RegionOptions) -> Claim {
             }
         }
     }
-    not_proved("the solver's candidates did not pass the exact check".to_owned(), numbers.distance(rate))
+    not_proved(Reason::CandidateFailed, numbers.distance(rate))
 }
 
 /// Margins by which the inequalities are tightened, in turn.
@@ -327,7 +323,7 @@ fn candidate(numbers: &Numbers, x: &[f64], rho: f64, rate: f64, shrink: f64) -> 
     })
 }
 
-fn not_proved(reason: String, distance: Option<f64>) -> Claim {
+fn not_proved(reason: Reason, distance: Option<f64>) -> Claim {
     Claim::NotProved(NotProvedClaim {
         statement: String::new(),
         of: ClaimKind::Region,

@@ -8,7 +8,8 @@ use certune_verify::{Certificate, Claim, Verdict};
 
 fn problem(kappa_a: f64, compensated: bool, friction: [f64; 2], margin: f64) -> Problem {
     let all = |x: f64| vec![x; 7];
-    let arm = ArmValues { name: "panda".to_owned(), joints: 7, sha256: "0".repeat(64) };
+    let arm =
+        ArmValues { name: "panda".to_owned(), joints: 7, sha256: "0".repeat(64), payload_com_m: [0.0, 0.0, 0.307] };
     let gains = AicGainValues {
         kappa_mu: all(11.67),
         kappa_a: all(kappa_a),
@@ -32,7 +33,6 @@ fn problem(kappa_a: f64, compensated: bool, friction: [f64; 2], margin: f64) -> 
         k_g_n_m_per_rad: 69.28 * up,
         k_c_kg_m2: 2.254 * up,
         k_r: 4.962 * up,
-        over: "all angles".to_owned(),
         margin,
         samples: 1,
         local_starts: 1,

@@ -123,7 +123,12 @@ impl<const N: usize> ArmCertifier<N> {
         }
         let members = ArmBox::new(&Model::<N>::new(robot)?, &ranges)?;
         let sampled = sampled_constants(&members, &SamplingOptions::default());
-        let arm = ArmValues { name: robot.name().to_owned(), joints: N, sha256: robot.sha256() };
+        let arm = ArmValues {
+            name: robot.name().to_owned(),
+            joints: N,
+            sha256: robot.sha256(),
+            payload_com_m: ranges.payload_com_m,
+        };
         Ok(Self { arm, family: family.clone(), members, sampled })
     }
 
@@ -169,7 +174,6 @@ impl<const N: usize> ArmCertifier<N> {
             k_g_n_m_per_rad: s.constants.k_g_n_m_per_rad,
             k_c_kg_m2: s.constants.k_c_kg_m2,
             k_r: s.constants.k_r,
-            over: s.over.clone(),
             margin: s.margin,
             samples: s.samples,
             local_starts: s.local_starts,
@@ -234,7 +238,7 @@ impl<const N: usize> ArmCertifier<N> {
             friction_n_m_s_per_rad: friction,
             stiffness_n_m_per_rad: stiffness,
         };
-        let numbers = |values: &[f64]| values.iter().map(|&x| Number::decimal(x)).collect::<Option<Vec<_>>>();
+        let numbers = |values: &[f64]| values.iter().map(|&x| decimal(x)).collect::<Option<Vec<_>>>();
         let scales = &at[N..];
         let [rotor_lower, rotor_upper] = self.family.rotor_inertia_kg_m2;
         let groups = self.members.groups().len();
@@ -243,16 +247,21 @@ impl<const N: usize> ArmCertifier<N> {
         let attained = Attained {
             q_rad: numbers(member.q.as_slice())?,
             link_mass_scale: numbers(&scales[..N])?,
-            payload_kg: Number::decimal(payload)?,
-            rotor_inertia_kg_m2: Number::decimal(rotor_lower + fraction * (rotor_upper - rotor_lower))?,
-            friction_n_m_s_per_rad: Number::decimal(friction)?,
-            eigenvalue_per_s: [Number::decimal(eigenvalue.re)?, Number::decimal(eigenvalue.im)?],
+            payload_kg: decimal(payload)?,
+            rotor_inertia_kg_m2: decimal(rotor_lower + fraction * (rotor_upper - rotor_lower))?,
+            friction_n_m_s_per_rad: decimal(friction)?,
+            eigenvalue_per_s: [decimal(eigenvalue.re)?, decimal(eigenvalue.im)?],
         };
         found.inertia_kg_m2.is_finite().then_some((found, attained))
     }
 }
 
-/// An eigenvector by two steps of inverse iteration, from a start without symmetry.
+/// The decimal of a search's result; what is zero to rounding is written as zero.
+fn decimal(x: f64) -> Option<Number> {
+    Number::decimal(if x.abs() < 1e-12 { 0.0 } else { x })
+}
+
+/// An eigenvector by three steps of inverse iteration, from a start without symmetry.
 fn eigenvector(a: &DMatrix<f64>, eigenvalue: Complex<f64>) -> Option<DVector<Complex<f64>>> {
     let order = a.nrows();
     // A shift a little off the eigenvalue keeps the factorisation regular.

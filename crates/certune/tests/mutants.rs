@@ -264,3 +264,67 @@ fn truncated_and_scrambled_texts_are_unreadable_and_never_panic() {
         }
     }
 }
+
+/// Numbers that would take minutes or gigabytes, or that a reader would mistake, in every place of every document.
+#[test]
+fn hostile_numbers_are_refused_everywhere() {
+    let digits = "1".repeat(300);
+    let hostile = ["1e-2147483648", "1p-2147483648", "1e1200", "1e-1200", "1e+-3", "007", "-0", "NaN", "1p9", &digits];
+    let mut tried = 0;
+    for text in originals() {
+        let original: Value = serde_json::from_str(text).unwrap();
+        let mut paths = Vec::new();
+        leaves(&original, "", &mut paths);
+        for path in paths.iter().filter(|path| !path.contains("witness")) {
+            for number in hostile {
+                let mut mutant = original.clone();
+                let leaf = mutant.pointer_mut(path).unwrap();
+                if !leaf.is_string() {
+                    continue;
+                }
+                *leaf = Value::String(number.to_owned());
+                tried += 1;
+                let Ok(document) = serde_json::from_value::<Document>(mutant) else { continue };
+                let accepted = verify(&to_json(&seal(document)).unwrap());
+                // Statements, hash and description are written again by `seal`; everything else must be refused.
+                let rewritten = ["/about", "/sha256"].contains(&path.as_str()) || path.ends_with("/statement");
+                let name_alone = path == "/arm/name";
+                assert!(
+                    rewritten || name_alone || !accepted.is_ok_and(|verdict| verdict.is_ok()),
+                    "{number} at {path}"
+                );
+            }
+        }
+    }
+    println!("{tried} hostile numbers refused");
+}
+
+/// An arm whose rotors alone are heavier than `m_hi` does not exist, and everything would be true of it.
+#[test]
+fn a_family_without_members_is_refused() {
+    let mut document: Document = serde_json::from_str(&originals()[0]).unwrap();
+    document.family.rotor_inertia_kg_m2 = ["10".parse().unwrap(), "20".parse().unwrap()];
+    assert!(verify(&to_json(&seal(document)).unwrap()).unwrap().is_err());
+}
+
+/// A refusal that names an arm outside the family is rejected.
+#[test]
+fn an_attained_arm_must_belong_to_the_family() {
+    let document: Document = serde_json::from_str(&originals()[2]).unwrap();
+    type Edit = fn(&mut certune::verify::Attained);
+    let edits: [Edit; 6] = [
+        |a| a.q_rad.clear(),
+        |a| a.link_mass_scale[0] = "-5".parse().unwrap(),
+        |a| a.payload_kg = "99".parse().unwrap(),
+        |a| a.rotor_inertia_kg_m2 = "-3".parse().unwrap(),
+        |a| a.friction_n_m_s_per_rad = "1000".parse().unwrap(),
+        |a| a.eigenvalue_per_s[0] = "-5".parse().unwrap(),
+    ];
+    for (k, edit) in edits.into_iter().enumerate() {
+        let mut forged = document.clone();
+        let Claim::Refused(refusal) = &mut forged.claims[0] else { panic!() };
+        edit(refusal.attained.as_mut().unwrap());
+        assert!(verify(&to_json(&seal(forged)).unwrap()).unwrap().is_err(), "edit {k}");
+    }
+    assert!(verify(&to_json(&seal(document)).unwrap()).unwrap().is_ok());
+}

@@ -16,8 +16,8 @@
 //! | joint frame in its parent | ±0.4 each way; quarter turns as often as any turn | m, rad |
 //! | rotor inertia, viscous and Coulomb friction | none, or up to 0.2, 2, 1 | kg m², N m s/rad, N m |
 //!
-//! Quarter turns are drawn on purpose: real arms have little else, and parallel or meeting axes are where a recursion that is wrong by a term goes
-//! unnoticed or a division by zero hides.
+//! Quarter turns are drawn on purpose: real arms have little else, and parallel or meeting axes are where a recursion
+//! that is wrong by a term goes unnoticed or a division by zero hides.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::RangeInclusive;
@@ -101,10 +101,10 @@ fn assembled((links, flange): (Vec<Link>, Frame)) -> Result<Robot, RobotError> {
 
 /// A valid serial arm of `N` joints: any frames, bodies, limits and drives.
 ///
-/// Each link is a uniform box of 0.05 to 10 kg with sides of 2 to 40 cm, centred within 0.3 m of its joint's frame each way; that frame is within 0.4 m of its
-/// parent each way, turned by quarter turns or by any angles; there are arms with and without limits, rotor inertia (up to 0.2 kg m²), viscous
-/// (up to 2 N m s/rad) and Coulomb friction (up to 1 N m). Shrinks towards cubes of 1 kg and 10 cm without limits or friction, all on one
-/// vertical axis.
+/// Each link is a uniform box of 0.05 to 10 kg with sides of 2 to 40 cm, centred within 0.3 m of its joint's frame each
+/// way; that frame is within 0.4 m of its parent each way, turned by quarter turns or by any angles; there are arms
+/// with and without limits, rotor inertia (up to 0.2 kg m²), viscous (up to 2 N m s/rad) and Coulomb friction (up to 1
+/// N m). Shrinks towards cubes of 1 kg and 10 cm without limits or friction, all on one vertical axis.
 ///
 /// ```
 /// use certune_dynamics::{Model, mass_matrix};
@@ -123,8 +123,8 @@ pub fn serial_arm<const N: usize>() -> impl Strategy<Value = Robot> {
     parts::<N>().prop_map(|parts| assembled(parts).expect("an arm that is valid by construction"))
 }
 
-/// A uniform box of 2 to 40 cm in the hand: its centre within 10 cm of the last link's axis and up to 30 cm out along it, any way round.
-/// A mass of 0 is an empty hand. Shrinks to the lightest box of `mass_kg`.
+/// A uniform box of 2 to 40 cm in the hand: its centre within 10 cm of the last link's axis and up to 30 cm out along
+/// it, any way round. A mass of 0 is an empty hand. Shrinks to the lightest box of `mass_kg`.
 ///
 /// For a payload known by its mass alone, see [`Payload::at_grasp`].
 ///

@@ -8,8 +8,9 @@
 //! Each end comes up once in twelve draws, and shrinking bisects `d` towards 0: `x` towards the simplest value, or the end nearest to
 //! it. Drawing the ends by a second strategy instead would cut a failure found there off from its neighbours.
 //!
-//! `d` is a whole number of steps, 2^24 of them to the width, because proptest (1.12) bisects integers only: a range of `f64` tries the
-//! simplest value and, if that passes, keeps what it found. A failure is therefore reported to 1e-7 of the range.
+//! `d` is a whole number of steps, 2^24 of them to the width, because proptest (1.12) bisects integers only: a range of
+//! `f64` tries the simplest value and, if that passes, keeps what it found. A failure is therefore reported to 1e-7 of
+//! the range.
 
 use std::ops::RangeInclusive;
 

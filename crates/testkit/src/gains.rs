@@ -10,9 +10,9 @@
 //! | σ_μ′ | `sigma_dmu` | 0.5 to 100 | 10 | variance |
 //! | T | `reference_time_constant_s` | 1 | 1 | s |
 //!
-//! Source: the published gains are those of Pezzato, Ferrari, Hernández Corbato, *A novel adaptive controller for robot manipulators based on
-//! active inference* (2020), simulation; the ranges are those of the shipped search space. Limits: every draw is valid for
-//! the controller, none is promised to be stable on an arm.
+//! Source: the published gains are those of Pezzato, Ferrari, Hernández Corbato, *A novel adaptive controller for robot
+//! manipulators based on active inference* (2020), simulation; the ranges are those of the shipped search space.
+//! Limits: every draw is valid for the controller, none is promised to be stable on an arm.
 
 use std::ops::RangeInclusive;
 

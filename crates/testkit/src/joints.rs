@@ -24,8 +24,8 @@ pub fn configuration<const N: usize>() -> impl Strategy<Value = Joints<N>> + Clo
     joints_within(PI)
 }
 
-/// A configuration within the limits of `robot`, its ends included; a joint without limits counts as one with `[-π, π]` rad. Shrinks to 0 or, where a
-/// joint cannot reach 0, to the end nearest to it.
+/// A configuration within the limits of `robot`, its ends included; a joint without limits counts as one with `[-π, π]`
+/// rad. Shrinks to 0 or, where a joint cannot reach 0, to the end nearest to it.
 ///
 /// # Panics
 /// When the robot has not `N` joints.

@@ -13,9 +13,9 @@
 //! | [`joints_within`] | accelerations, torques | 0 |
 //! | [`aic_gains`], [`shared_aic_gains`] | gains of the active inference controller | the published gains |
 //!
-//! Every number comes from [`within`] or [`log_within`]: the ends of a range are drawn themselves, since that is where arms and
-//! controllers fail first, and a failure shrinks towards the simplest value, so that the arm reported is as ordinary as a failing arm can
-//! be. All chance is proptest's: a failure replays from its seed.
+//! Every number comes from [`within`] or [`log_within`]: the ends of a range are drawn themselves, since that is where
+//! arms and controllers fail first, and a failure shrinks towards the simplest value, so that the arm reported is as
+//! ordinary as a failing arm can be. All chance is proptest's: a failure replays from its seed.
 //!
 //! # A test for one's own gains
 //!
@@ -59,8 +59,8 @@
 //! my_gains_reach_the_goal();
 //! ```
 //!
-//! Limits: revolute joints on a fixed base, as everywhere in this workspace. A strategy panics when it is made from a range that is none
-//! (empty, NaN, a scale below 0): such a test is wrong, whatever it tests.
+//! Limits: revolute joints on a fixed base, as everywhere in this workspace. A strategy panics when it is made from a
+//! range that is none (empty, NaN, a scale below 0): such a test is wrong, whatever it tests.
 #![forbid(unsafe_code)]
 
 mod arm;

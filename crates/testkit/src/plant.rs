@@ -51,7 +51,8 @@ impl PlantRanges {
         }
     }
 
-    /// The plant box of the pick-and-place scenario: masses ±20 %, up to a full bottle in hand, friction 0.5 to 2, rotor inertia up to 0.1.
+    /// The plant box of the pick-and-place scenario: masses ±20 %, up to a full bottle in hand, friction 0.5 to 2,
+    /// rotor inertia up to 0.1.
     pub fn pick_and_place() -> Self {
         Self {
             payload_kg: 0.0..=PANDA_PAYLOAD_KG,

@@ -1,7 +1,8 @@
 //! How close two numbers must be, and why: tolerances with a name and a scale.
 //!
-//! A comparison has two parts. The **scale** is the size of what was added up on the way to the numbers, in their unit: a result that is small
-//! because large terms cancel carries the rounding of the large ones. The **relative tolerance** counts roundings.
+//! A comparison has two parts. The **scale** is the size of what was added up on the way to the numbers, in their unit:
+//! a result that is small because large terms cancel carries the rounding of the large ones. The **relative tolerance**
+//! counts roundings.
 //!
 //! ```text
 //! |left - right|  <=  rtol * scale          entry by entry; NaN never passes
@@ -28,8 +29,9 @@
 use certune_dynamics::Robot;
 use nalgebra::Vector3;
 
-/// Roundings that one joint adds to a result of a recursion: two or three products of rotations and inertias in a row.
-pub const ROUNDINGS_PER_JOINT: u32 = 100;
+/// Roundings of the size of the scale that one joint adds to a result of a recursion. The recursions of this workspace stay
+/// below one on the arms of [`serial_arm`](crate::serial_arm), since the scales here are those of a stretched arm.
+pub const ROUNDINGS_PER_JOINT: u32 = 10;
 
 /// Two lists that should agree and do not.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -58,10 +60,12 @@ pub enum Mismatch {
     },
 }
 
-/// Whether two lists agree entry by entry to within `rtol * scale`; `scale` in the unit of the entries. `?` hands a mismatch to proptest.
+/// Whether two lists agree entry by entry to within `rtol * scale`; `scale` in the unit of the entries. `?` hands a
+/// mismatch to proptest.
 ///
 /// # Errors
-/// [`Mismatch`] for lists of different length, or the first entry that is further away, or for which that cannot be said because a number is NaN.
+/// [`Mismatch`] for lists of different length, or the first entry that is further away, or for which that cannot be
+/// said because a number is NaN.
 pub fn close(left: &[f64], right: &[f64], scale: f64, rtol: f64) -> Result<(), Mismatch> {
     if left.len() != right.len() {
         return Err(Mismatch::Length { left: left.len(), right: right.len() });
@@ -86,11 +90,12 @@ pub fn solve_rtol(joints: usize, condition: f64) -> f64 {
     recursion_rtol(joints) * condition
 }
 
-/// Relative tolerance between a derivative and the central difference `(f(x + step) - f(x - step)) / (2 step)`: rounding of f over the step, and the third
-/// derivative that the difference leaves out.
+/// Relative tolerance between a derivative and the central difference `(f(x + step) - f(x - step)) / (2 step)`:
+/// rounding of f over the step, and the third derivative that the difference leaves out.
 ///
-/// `step` is relative to the length over which `f` changes by its own size (1 rad for functions of joint angles, whose every derivative is as large as they are). With 100
-/// roundings the best step is about 2e-5 and the tolerance there 1.5e-9.
+/// `step` is relative to the length over which `f` changes by its own size (1 rad for functions of joint angles, whose
+/// every derivative is as large as they are). With 100 roundings the best step is about 2e-5 and the tolerance there
+/// 1.5e-9.
 pub fn central_difference_rtol(step: f64, roundings: f64) -> f64 {
     roundings * f64::EPSILON / step + step * step
 }
@@ -104,7 +109,8 @@ fn reaches(robot: &Robot) -> impl Iterator<Item = (f64, f64, f64)> + '_ {
     })
 }
 
-/// No entry of M is larger in any configuration, kg m²: `sum m r² + tr J` over the links, r the stretched arm's length to the centre of mass, plus the largest rotor inertia.
+/// No entry of M is larger in any configuration, kg m²: `sum m r² + tr J` over the links, r the stretched arm's length
+/// to the centre of mass, plus the largest rotor inertia.
 ///
 /// Times a joint acceleration it bounds `M ddq`; times a squared joint speed it scales `C dq`.
 pub fn inertia_scale_kg_m2(robot: &Robot) -> f64 {

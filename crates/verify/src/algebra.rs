@@ -1,8 +1,13 @@
 //! Exact linear algebra and polynomials over the rationals.
 //!
+//! Determinants and Sturm sequences run over the integers (Bareiss; primitive remainders), where no fraction has to be
+//! reduced at every step.
+//!
 //! Sources: characteristic polynomial by Faddeev and LeVerrier; stability of a polynomial by Hurwitz determinants
 //! (Gantmacher, *Theory of Matrices*, vol. 2, ch. XV); real roots in an interval by Sturm's theorem; definiteness by LDL'.
 
+use num_bigint::{BigInt, Sign};
+use num_integer::Integer;
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 
@@ -90,36 +95,40 @@ fn multiply(x: &Matrix, y: &Matrix) -> Matrix {
     product
 }
 
-fn determinant(mut matrix: Matrix) -> BigRational {
+/// The coefficients times their common denominator: integers in the same proportions, for polynomials that must keep theirs.
+pub(crate) fn common_integers(polynomials: &[Vec<BigRational>]) -> Vec<Vec<BigInt>> {
+    let denominator = polynomials.iter().flatten().fold(BigInt::one(), |lcm, c| lcm.lcm(c.denom()));
+    let whole = |c: &BigRational| c.numer() * (&denominator / c.denom());
+    polynomials.iter().map(|p| p.iter().map(whole).collect()).collect()
+}
+
+/// Bareiss's elimination: every division is exact, and the last pivot is the determinant.
+fn determinant(mut matrix: Vec<Vec<BigInt>>) -> BigInt {
     let order = matrix.len();
-    let mut value = BigRational::one();
+    let mut previous = BigInt::one();
+    let mut negative = false;
     for k in 0..order {
         let Some(row) = (k..order).find(|&i| !matrix[i][k].is_zero()) else {
-            return BigRational::zero();
+            return BigInt::zero();
         };
         if row != k {
             matrix.swap(row, k);
-            value = -value;
+            negative = !negative;
         }
         let pivot = matrix[k][k].clone();
         for i in k + 1..order {
-            let factor = &matrix[i][k] / &pivot;
-            if factor.is_zero() {
-                continue;
-            }
-            for j in k..order {
-                let change = &factor * &matrix[k][j];
-                matrix[i][j] -= change;
+            for j in k + 1..order {
+                matrix[i][j] = (&pivot * &matrix[i][j] - &matrix[i][k] * &matrix[k][j]) / &previous;
             }
         }
-        value *= pivot;
+        previous = pivot;
     }
-    value
+    if negative { -previous } else { previous }
 }
 
 /// The leading Hurwitz determinant of size `size` of `p`, coefficients from the highest power down.
-pub(crate) fn hurwitz_determinant(p: &[BigRational], size: usize) -> BigRational {
-    let mut matrix = zeros(size);
+pub(crate) fn hurwitz_determinant(p: &[BigInt], size: usize) -> BigInt {
+    let mut matrix = vec![vec![BigInt::zero(); size]; size];
     for (row, entries) in matrix.iter_mut().enumerate() {
         for (column, entry) in entries.iter_mut().enumerate() {
             // Entry (i, j), counted from 1, is the coefficient a_{2j - i}.
@@ -136,81 +145,105 @@ pub(crate) fn hurwitz_determinant(p: &[BigRational], size: usize) -> BigRational
 ///
 /// Exact. A polynomial of degree 0 or with a leading coefficient that is not positive is answered with `false`: an empty
 /// set of roots would be vacuously stable.
-pub fn is_hurwitz(p: &[BigRational]) -> bool {
+pub(crate) fn is_hurwitz(p: &[BigInt]) -> bool {
     p.len() >= 2 && p[0].is_positive() && (1..p.len()).all(|size| hurwitz_determinant(p, size).is_positive())
 }
 
-/// A polynomial in one variable, coefficients from the constant up, without trailing zeros.
+/// A polynomial in one variable with integer coefficients, from the constant up, without trailing zeros.
+///
+/// Only its roots matter here, so it may be multiplied by positive numbers.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Polynomial(Vec<BigRational>);
+pub(crate) struct Polynomial(Vec<BigInt>);
 
 impl Polynomial {
-    pub(crate) fn new(mut coefficients: Vec<BigRational>) -> Self {
+    /// The polynomial divided by the content of its coefficients, which is positive.
+    pub(crate) fn new(mut coefficients: Vec<BigInt>) -> Self {
         while coefficients.last().is_some_and(Zero::is_zero) {
             coefficients.pop();
+        }
+        let content = coefficients.iter().fold(BigInt::zero(), |gcd, c| gcd.gcd(c));
+        if content > BigInt::one() {
+            for c in &mut coefficients {
+                *c = &*c / &content;
+            }
         }
         Self(coefficients)
     }
 
-    /// The polynomial of degree below `values.len()` that takes `values[k]` at `k = 0, 1, 2, ..` (Newton's divided differences).
-    pub(crate) fn through(values: &[BigRational]) -> Self {
+    /// A positive multiple of the polynomial of degree below `values.len()` that takes `values[k]` at `k = 0, 1, 2, ..`.
+    ///
+    /// Newton's form on the integers, `p(x) = sum_k D^k(0) x (x-1) .. (x-k+1) / k!`, times `n!`.
+    pub(crate) fn through(values: &[BigInt]) -> Self {
         let mut differences = values.to_vec();
         for level in 1..values.len() {
             for k in (level..values.len()).rev() {
-                differences[k] = (&differences[k] - &differences[k - 1]) / BigRational::from_integer(level.into());
+                differences[k] = &differences[k] - &differences[k - 1];
             }
         }
-        // Horner on the Newton form: p = d_n; p = p (x - k) + d_k.
-        let mut coefficients: Vec<BigRational> = Vec::new();
+        // Horner: p = c_n; p = p (x - k) + c_k, with c_k = D^k(0) n! / k!.
+        let mut weight = BigInt::one();
+        let mut coefficients: Vec<BigInt> = Vec::new();
         for (k, difference) in differences.iter().enumerate().rev() {
-            let node = BigRational::from_integer(k.into());
-            let mut next = vec![BigRational::zero(); coefficients.len() + 1];
+            let node = BigInt::from(k);
+            let mut next = vec![BigInt::zero(); coefficients.len() + 1];
             for (power, coefficient) in coefficients.iter().enumerate() {
                 next[power + 1] += coefficient;
                 next[power] -= coefficient * &node;
             }
-            next[0] += difference;
+            next[0] += difference * &weight;
             coefficients = next;
+            weight *= node;
         }
         Self::new(coefficients)
     }
 
-    pub(crate) fn at(&self, x: &BigRational) -> BigRational {
-        self.0.iter().rev().fold(BigRational::zero(), |sum, c| sum * x + c)
+    /// Whether the value at `numerator / denominator`, `denominator > 0`, is negative, zero or positive.
+    pub(crate) fn sign_at(&self, numerator: &BigInt, denominator: &BigInt) -> Sign {
+        let mut value = BigInt::zero();
+        let mut power = BigInt::one();
+        for coefficient in self.0.iter().rev() {
+            value = value * numerator + coefficient * &power;
+            power *= denominator;
+        }
+        value.sign()
     }
 
     fn derivative(&self) -> Self {
-        Self::new(self.0.iter().enumerate().skip(1).map(|(k, c)| c * BigRational::from_integer(k.into())).collect())
+        Self::new(self.0.iter().enumerate().skip(1).map(|(k, c)| c * BigInt::from(k)).collect())
     }
 
-    /// Minus the remainder of `self / divisor`, scaled by a positive number to keep the digits few.
+    /// Minus the remainder of `self / divisor`, times a positive number.
     fn negative_remainder(&self, divisor: &Self) -> Self {
         let mut rest = self.0.clone();
         let Some(lead) = divisor.0.last() else { return Self(Vec::new()) };
         while rest.len() >= divisor.0.len() {
-            let Some(top) = rest.last() else { break };
-            let factor = top / lead;
+            let Some(top) = rest.last().cloned() else { break };
+            // |lead| rest - sign(lead) top x^shift divisor: the top cancels, and |lead| is positive.
+            let top = if lead.is_negative() { -top } else { top };
             let shift = rest.len() - divisor.0.len();
+            for c in &mut rest {
+                *c *= lead.abs();
+            }
             for (k, c) in divisor.0.iter().enumerate() {
-                rest[shift + k] -= &factor * c;
+                rest[shift + k] -= &top * c;
             }
             rest.pop();
         }
-        let mut negative = Self::new(rest.into_iter().map(|c| -c).collect());
-        if let Some(scale) = negative.0.last().map(Signed::abs) {
-            for c in &mut negative.0 {
-                *c = &*c / &scale;
-            }
-        }
-        negative
+        Self::new(rest.into_iter().map(|c| -c).collect())
     }
 
-    /// Whether the polynomial has no real root in the closed interval `[lower, upper]`, `lower <= upper`.
+    /// Whether the polynomial has no real root in the closed interval `[0, 1]`.
     ///
-    /// Exact, by Sturm's theorem, which counts the distinct roots in `(lower, upper]` when neither end is a root. The zero
+    /// Exact, by Sturm's theorem, which counts the distinct roots in `(0, 1]` when neither end is a root. The zero
     /// polynomial has roots everywhere.
-    pub(crate) fn has_no_root_in(&self, lower: &BigRational, upper: &BigRational) -> bool {
-        if self.0.is_empty() || self.at(lower).is_zero() || self.at(upper).is_zero() {
+    pub(crate) fn has_no_root_in_unit_interval(&self) -> bool {
+        self.has_no_root_in([&BigInt::zero(), &BigInt::one()], &BigInt::one())
+    }
+
+    /// As above for `[lower / denominator, upper / denominator]`.
+    fn has_no_root_in(&self, [lower, upper]: [&BigInt; 2], denominator: &BigInt) -> bool {
+        let is_root = |x: &BigInt| self.sign_at(x, denominator) == Sign::NoSign;
+        if self.0.is_empty() || is_root(lower) || is_root(upper) {
             return false;
         }
         let mut chain = vec![self.clone(), self.derivative()];
@@ -221,9 +254,9 @@ impl Polynomial {
             let next = before.negative_remainder(last);
             chain.push(next);
         }
-        let changes = |x: &BigRational| {
-            let signs: Vec<bool> =
-                chain.iter().map(|p| p.at(x)).filter(|v| !v.is_zero()).map(|v| v.is_positive()).collect();
+        let changes = |x: &BigInt| {
+            let signs: Vec<Sign> =
+                chain.iter().map(|p| p.sign_at(x, denominator)).filter(|&sign| sign != Sign::NoSign).collect();
             signs.windows(2).filter(|pair| pair[0] != pair[1]).count()
         };
         changes(lower) == changes(upper)
@@ -238,6 +271,18 @@ mod tests {
 
     fn rationals(values: &[i64]) -> Vec<BigRational> {
         values.iter().map(|&v| ratio(v, 1)).collect()
+    }
+
+    fn integers(values: &[i64]) -> Vec<BigInt> {
+        values.iter().map(|&v| v.into()).collect()
+    }
+
+    fn one_in_integers(p: Vec<BigRational>) -> Vec<BigInt> {
+        common_integers(&[p]).remove(0)
+    }
+
+    fn no_root(p: &Polynomial, lower: i64, upper: i64, denominator: i64) -> bool {
+        p.has_no_root_in([&lower.into(), &upper.into()], &denominator.into())
     }
 
     fn matrix(rows: &[&[i64]]) -> Matrix {
@@ -276,21 +321,21 @@ mod tests {
     #[test]
     fn hurwitz_knows_the_routh_boundary() {
         // s^3 + s^2 + k s + 1 is stable exactly for k > 1.
-        assert!(is_hurwitz(&[ratio(1, 1), ratio(1, 1), ratio(1001, 1000), ratio(1, 1)]));
-        assert!(!is_hurwitz(&rationals(&[1, 1, 1, 1])));
-        assert!(!is_hurwitz(&rationals(&[1])), "vacuous");
-        assert!(!is_hurwitz(&rationals(&[-1, -1])), "negative leading coefficient");
-        assert!(!is_hurwitz(&rationals(&[1, 1, 0])), "root at zero");
+        assert!(is_hurwitz(&integers(&[1000, 1000, 1001, 1000])));
+        assert!(!is_hurwitz(&integers(&[1, 1, 1, 1])));
+        assert!(!is_hurwitz(&integers(&[1])), "vacuous");
+        assert!(!is_hurwitz(&integers(&[-1, -1])), "negative leading coefficient");
+        assert!(!is_hurwitz(&integers(&[1, 1, 0])), "root at zero");
     }
 
     #[test]
     fn sturm_sees_double_roots_and_roots_at_the_ends() {
-        let double = Polynomial::new(rationals(&[1, -2, 1])); // (x - 1)^2
-        assert!(!double.has_no_root_in(&ratio(0, 1), &ratio(2, 1)));
-        assert!(double.has_no_root_in(&ratio(0, 1), &ratio(9, 10)));
-        assert!(!double.has_no_root_in(&ratio(0, 1), &ratio(1, 1)));
-        assert!(Polynomial::new(rationals(&[3])).has_no_root_in(&ratio(0, 1), &ratio(1, 1)));
-        assert!(!Polynomial::new(Vec::new()).has_no_root_in(&ratio(0, 1), &ratio(1, 1)));
+        let double = Polynomial::new(integers(&[1, -2, 1])); // (x - 1)^2
+        assert!(!no_root(&double, 0, 2, 1));
+        assert!(no_root(&double, 0, 9, 10));
+        assert!(!double.has_no_root_in_unit_interval());
+        assert!(Polynomial::new(integers(&[3])).has_no_root_in_unit_interval());
+        assert!(!Polynomial::new(Vec::new()).has_no_root_in_unit_interval());
     }
 
     proptest! {
@@ -302,7 +347,8 @@ mod tests {
                 g[i][j] += ratio(entries[4 * k + i] * entries[4 * k + j], 1);
             }} g[i][i] += ratio(shift, 1); }
             let minors_positive = (1..=4).all(|n| {
-                determinant(g[..n].iter().map(|row| row[..n].to_vec()).collect()).is_positive()
+                let leading = g[..n].iter().map(|row| row[..n].iter().map(|x| x.numer().clone()).collect()).collect();
+                determinant(leading).is_positive()
             });
             prop_assert_eq!(positive_definite_pivots(&g).is_some(), minors_positive);
         }
@@ -316,23 +362,23 @@ mod tests {
             let mut product = vec![BigRational::zero(); p.len() + 2];
             for (i, c) in p.iter().enumerate() { for (j, d) in quadratic.iter().enumerate() { product[i + j] += c * d; } }
             p = product;
-            prop_assert_eq!(is_hurwitz(&p), real.iter().all(|&r| r < 0) && pair.0 < 0);
+            prop_assert_eq!(is_hurwitz(&one_in_integers(p)), real.iter().all(|&r| r < 0) && pair.0 < 0);
         }
 
         #[test]
         fn sturm_agrees_with_chosen_roots(roots in prop::collection::vec(-20_i64..20, 1..6), interval in (-20_i64..20, 0_i64..15)) {
             let mut down = with_roots(&roots.iter().map(|&r| ratio(r, 4)).collect::<Vec<_>>());
             down.reverse();
-            let p = Polynomial::new(down);
-            let (lower, upper) = (ratio(interval.0, 4), ratio(interval.0 + interval.1, 4));
+            let p = Polynomial::new(one_in_integers(down));
             let free = !roots.iter().any(|&r| (interval.0..=interval.0 + interval.1).contains(&r));
-            prop_assert_eq!(p.has_no_root_in(&lower, &upper), free);
+            prop_assert_eq!(no_root(&p, interval.0, interval.0 + interval.1, 4), free);
         }
 
         #[test]
         fn interpolation_returns_the_polynomial(coefficients in prop::collection::vec(-9_i64..9, 1..7)) {
-            let p = Polynomial::new(rationals(&coefficients));
-            let values: Vec<_> = (0..7).map(|k| p.at(&ratio(k, 1))).collect();
+            let p = Polynomial::new(integers(&coefficients));
+            let at = |x: i64| p.0.iter().rev().fold(BigInt::zero(), |sum, c| sum * x + c);
+            let values: Vec<_> = (0..7).map(at).collect();
             prop_assert_eq!(Polynomial::through(&values), p);
         }
     }

@@ -5,14 +5,16 @@ use num_traits::{Signed, Zero};
 use sha2::{Digest, Sha256};
 
 use crate::aic::SharedGains;
-use crate::document::{Claim, Document, Evidence, Family, Grade, RegionClaim};
+use crate::document::{Attained, BoxPoint, Claim, Document, Evidence, Grade, RegionClaim};
 use crate::error::{Rejection, VerifyError};
 use crate::exponential::{LoopBox, decays, is_stable_at};
 use crate::number::{Number, positive, unit_interval};
 use crate::region::{ArmConstants, Inequality, Witness, inequalities};
-use crate::statement::{Assumption, assumptions, statement};
+use crate::statement::{Assumption, about, assumptions, statement};
 
 const SCHEMA: u32 = 1;
+const MOST_BYTES: usize = 1 << 20;
+const MOST_CLAIMS: usize = 8;
 
 /// What became of one entry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,6 +82,7 @@ pub(crate) fn allowed_grade(evidence: &Evidence) -> (Grade, &'static str) {
 #[must_use]
 pub fn seal(mut document: Document) -> Document {
     document.schema = SCHEMA;
+    document.about = about(&document);
     let statements: Vec<String> = document.claims.iter().map(|claim| statement(&document, claim)).collect();
     let (allowed, _) = allowed_grade(&document.constants.evidence);
     for (claim, derived) in document.claims.iter_mut().zip(statements) {
@@ -113,11 +116,19 @@ pub fn verify(text: &str) -> Result<Result<Certificate, Rejection>, VerifyError>
     struct Head {
         schema: u32,
     }
+    if text.len() > MOST_BYTES {
+        return Err(VerifyError::Length { found: text.len(), most: MOST_BYTES });
+    }
     let head: Head = serde_json::from_str(text)?;
     if head.schema != SCHEMA {
         return Err(VerifyError::Schema { found: head.schema, expected: SCHEMA });
     }
     let document: Document = serde_json::from_str(text)?;
+    // One document, one text (but for blanks and the order of fields): the reader is more tolerant than the format.
+    let written: serde_json::Value = serde_json::from_str(text)?;
+    if serde_json::to_value(&document)? != written {
+        return Ok(Err(Rejection::Form));
+    }
     Ok(check(document))
 }
 
@@ -129,7 +140,14 @@ fn check(document: Document) -> Result<Certificate, Rejection> {
     if document.claims.is_empty() {
         return Err(Rejection::Empty);
     }
+    if document.claims.len() > MOST_CLAIMS {
+        return Err(Rejection::Crowded { found: document.claims.len(), most: MOST_CLAIMS });
+    }
     check_quantities(&document)?;
+    let derived = about(&document);
+    if document.about != derived {
+        return Err(Rejection::About { derived });
+    }
     let checked = document
         .claims
         .iter()
@@ -143,9 +161,36 @@ fn require(quantity: &'static str, number: &Number, holds: bool, expected: &'sta
     if holds { Ok(()) } else { Err(Rejection::Quantity { quantity, value: number.to_string(), expected }) }
 }
 
+/// A number that stands in a statement: a decimal, and 0 or of a size that someone could mean.
+fn require_plain(quantity: &'static str, number: &Number) -> Result<(), Rejection> {
+    let size = number.value().abs();
+    let thousand_billions = BigRational::from_integer(1_000_000_000_000_i64.into());
+    let sensible = size.is_zero() || (size <= thousand_billions && size >= thousand_billions.recip());
+    require(quantity, number, number.is_decimal() && sensible, "a decimal that is 0 or between 1e-12 and 1e12 in size")
+}
+
+fn require_positive(quantity: &'static str, number: &Number) -> Result<(), Rejection> {
+    require_plain(quantity, number)?;
+    require(quantity, number, positive(number.value()), "a positive number")
+}
+
+fn require_at_least_zero(quantity: &'static str, number: &Number) -> Result<(), Rejection> {
+    require_plain(quantity, number)?;
+    require(quantity, number, !number.value().is_negative(), "a number of at least 0")
+}
+
 fn require_interval(quantity: &'static str, [lower, upper]: &[Number; 2]) -> Result<(), Rejection> {
-    require(quantity, lower, !lower.value().is_negative(), "a least value of at least 0")?;
+    require_at_least_zero(quantity, lower)?;
+    require_plain(quantity, upper)?;
     require(quantity, upper, lower.value() <= upper.value(), "a largest value no smaller than the least")
+}
+
+/// Within the interval, to the rounding of a floating-point search.
+fn require_within(quantity: &'static str, number: &Number, [lower, upper]: [&BigRational; 2]) -> Result<(), Rejection> {
+    require_plain(quantity, number)?;
+    let rounding = BigRational::new(1.into(), 1_000_000_000_i64.into());
+    let within = &(lower - &rounding) <= number.value() && number.value() <= &(upper + &rounding);
+    require(quantity, number, within, "a number within the family's interval")
 }
 
 /// What every claim needs: gains and family that exist, constants of a family that is not empty.
@@ -154,41 +199,82 @@ fn check_quantities(document: &Document) -> Result<(), Rejection> {
     if arm.joints == 0 {
         return Err(Rejection::Length { quantity: "joints", found: 0, expected: 1 });
     }
-    // The name stands in the statement: it must not be able to say anything.
+    let refused = |quantity: &'static str, value: &str, expected: &'static str| {
+        Err(Rejection::Quantity { quantity, value: value.chars().take(64).collect(), expected })
+    };
+    // What stands in the statement must not be able to say anything.
     let plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
     if arm.name.is_empty() || arm.name.len() > 64 || !arm.name.chars().all(plain) {
-        let value = arm.name.chars().take(64).collect();
-        return Err(Rejection::Quantity {
-            quantity: "arm name",
-            value,
-            expected: "letters, digits, - _ . (at most 64)",
-        });
+        return refused("arm name", &arm.name, "letters, digits, - _ . (at most 64)");
+    }
+    if arm.sha256.len() != 64 || !arm.sha256.bytes().all(|c| matches!(c, b'0'..=b'9' | b'a'..=b'f')) {
+        return refused("arm sha256", &arm.sha256, "64 lower-case hexadecimal digits");
     }
     for (gain, list) in gains.named() {
         if list.len() != arm.joints {
             return Err(Rejection::Length { quantity: gain, found: list.len(), expected: arm.joints });
         }
         for number in list {
-            require(gain, number, positive(number.value()), "a positive number")?;
+            require_positive(gain, number)?;
         }
     }
-    let Family { friction_n_m_s_per_rad, mass_uncertainty, payload_kg, rotor_inertia_kg_m2, .. } = family;
-    require_interval("friction_n_m_s_per_rad", friction_n_m_s_per_rad)?;
-    require_interval("payload_kg", payload_kg)?;
-    require_interval("rotor_inertia_kg_m2", rotor_inertia_kg_m2)?;
-    let share = mass_uncertainty.value();
-    let one = BigRational::from_integer(1.into());
-    require("mass_uncertainty", mass_uncertainty, !share.is_negative() && *share < one, "a share in [0, 1)")?;
-    require("m_lo_kg_m2", &constants.m_lo_kg_m2, positive(constants.m_lo_kg_m2.value()), "a positive number")?;
-    let ordered = constants.m_lo_kg_m2.value() <= constants.m_hi_kg_m2.value();
-    require("m_hi_kg_m2", &constants.m_hi_kg_m2, ordered, "a number no smaller than m_lo_kg_m2")?;
-    for (name, number) in
-        [("k_g_n_m_per_rad", &constants.k_g_n_m_per_rad), ("k_c_kg_m2", &constants.k_c_kg_m2), ("k_r", &constants.k_r)]
-    {
-        require(name, number, !number.value().is_negative(), "a number of at least 0")?;
+    require_interval("friction_n_m_s_per_rad", &family.friction_n_m_s_per_rad)?;
+    require_interval("payload_kg", &family.payload_kg)?;
+    require_interval("rotor_inertia_kg_m2", &family.rotor_inertia_kg_m2)?;
+    for coordinate in &family.payload_com_m {
+        require_plain("payload_com_m", coordinate)?;
     }
-    let Evidence::Sampled { margin, .. } = &constants.evidence;
-    require("margin", margin, !margin.value().is_negative(), "a share of at least 0")
+    let one = BigRational::from_integer(1.into());
+    let share = &family.mass_uncertainty;
+    require_at_least_zero("mass_uncertainty", share)?;
+    require("mass_uncertainty", share, *share.value() < one, "a share in [0, 1)")?;
+    let [least, largest] = [&constants.m_lo_kg_m2, &constants.m_hi_kg_m2];
+    require_positive("m_lo_kg_m2", least)?;
+    require_plain("m_hi_kg_m2", largest)?;
+    require("m_hi_kg_m2", largest, least.value() <= largest.value(), "a number no smaller than m_lo_kg_m2")?;
+    // M(q) is at least the rotor inertia: smaller constants would describe no arm at all, and every claim would hold of it.
+    let rotor = family.rotor_inertia_kg_m2[1].value();
+    require("m_hi_kg_m2", largest, rotor <= largest.value(), "a number no smaller than the largest rotor inertia")?;
+    require_at_least_zero("k_g_n_m_per_rad", &constants.k_g_n_m_per_rad)?;
+    require_at_least_zero("k_c_kg_m2", &constants.k_c_kg_m2)?;
+    require_at_least_zero("k_r", &constants.k_r)?;
+    let Evidence::Sampled { margin, samples, .. } = &constants.evidence;
+    require_at_least_zero("margin", margin)?;
+    require("margin", margin, *margin.value() <= one, "a share in [0, 1]")?;
+    if *samples == 0 { refused("samples", "0", "at least 1 sample") } else { Ok(()) }
+}
+
+/// An arm that a refusal names must at least be a member of the family; its eigenvalue is not checked.
+fn check_attained(document: &Document, point: &BoxPoint, rate: &Number, attained: &Attained) -> Result<(), Rejection> {
+    let Document { arm, family, .. } = document;
+    for (quantity, list) in [("q_rad", &attained.q_rad), ("link_mass_scale", &attained.link_mass_scale)] {
+        if list.len() != arm.joints {
+            return Err(Rejection::Length { quantity, found: list.len(), expected: arm.joints });
+        }
+    }
+    for angle in &attained.q_rad {
+        require_plain("q_rad", angle)?;
+    }
+    let one = BigRational::from_integer(1.into());
+    let share = family.mass_uncertainty.value();
+    for scale in &attained.link_mass_scale {
+        require_within("link_mass_scale", scale, [&(&one - share), &(&one + share)])?;
+    }
+    let ends = |interval: &'_ [Number; 2]| [interval[0].value().clone(), interval[1].value().clone()];
+    for (quantity, number, interval) in [
+        ("payload_kg", &attained.payload_kg, &family.payload_kg),
+        ("rotor_inertia_kg_m2", &attained.rotor_inertia_kg_m2, &family.rotor_inertia_kg_m2),
+        ("friction_n_m_s_per_rad", &attained.friction_n_m_s_per_rad, &family.friction_n_m_s_per_rad),
+    ] {
+        let [lower, upper] = ends(interval);
+        require_within(quantity, number, [&lower, &upper])?;
+    }
+    let same = attained.friction_n_m_s_per_rad.value() == point.friction_n_m_s_per_rad.value();
+    require("friction_n_m_s_per_rad", &attained.friction_n_m_s_per_rad, same, "the friction of the point")?;
+    let [real, imaginary] = &attained.eigenvalue_per_s;
+    require_plain("eigenvalue_per_s", imaginary)?;
+    require_plain("eigenvalue_per_s", real)?;
+    require("eigenvalue_per_s", real, *real.value() >= -rate.value(), "a real part of at least minus the rate")
 }
 
 /// The box of linearised loops that the family's constants span.
@@ -215,6 +301,7 @@ pub(crate) fn region_parts(
     document: &Document,
     claim: &RegionClaim,
 ) -> Result<(SharedGains, ArmConstants, Witness), Rejection> {
+    check_quantities(document)?;
     let gains = document.gains.shared(document.arm.joints)?;
     let constants = &document.constants;
     let arm = ArmConstants {
@@ -225,8 +312,9 @@ pub(crate) fn region_parts(
         coriolis_relative: constants.k_r.value().clone(),
     };
     let witness = &claim.witness;
-    require("radius_rad", &claim.radius_rad, positive(claim.radius_rad.value()), "a positive number")?;
-    require("rate_per_s", &claim.rate_per_s, positive(claim.rate_per_s.value()), "a positive number")?;
+    require_positive("radius_rad", &claim.radius_rad)?;
+    require_positive("rate_per_s", &claim.rate_per_s)?;
+    // A witness is only ever computed with: dyadics of any size will do.
     require("p", &witness.p, positive(witness.p.value()), "a positive number")?;
     require("rho", &witness.rho, positive(witness.rho.value()), "a positive number")?;
     require("theta", &witness.theta, unit_interval(witness.theta.value()), "a share in [0, 1]")?;
@@ -288,7 +376,7 @@ fn check_claim(document: &Document, index: usize, claim: &Claim) -> Result<Check
     match claim {
         Claim::Exponential(c) => {
             let gains = document.gains.shared(document.arm.joints)?;
-            require("rate_per_s", &c.rate_per_s, positive(c.rate_per_s.value()), "a positive number")?;
+            require_positive("rate_per_s", &c.rate_per_s)?;
             decays(&gains, &family_box(document), c.rate_per_s.value())
                 .map_err(|reason| Rejection::Polynomial { index, reason })?;
         }
@@ -303,7 +391,10 @@ fn check_claim(document: &Document, index: usize, claim: &Claim) -> Result<Check
         Claim::Refused(c) => {
             let [m, d, g] = [&c.point.inertia_kg_m2, &c.point.friction_n_m_s_per_rad, &c.point.stiffness_n_m_per_rad]
                 .map(Number::value);
-            require("rate_per_s", &c.rate_per_s, !c.rate_per_s.value().is_negative(), "a number of at least 0")?;
+            require_at_least_zero("rate_per_s", &c.rate_per_s)?;
+            for number in [&c.point.inertia_kg_m2, &c.point.friction_n_m_s_per_rad, &c.point.stiffness_n_m_per_rad] {
+                require_plain("point", number)?;
+            }
             document.gains.shared(document.arm.joints)?;
             if !family_box(document).contains([m, d, g]) {
                 return Err(Rejection::Counterexample { index, reason: "the point lies outside the family's box" });
@@ -311,9 +402,15 @@ fn check_claim(document: &Document, index: usize, claim: &Claim) -> Result<Check
             if is_stable_at(&document.gains, [m, d, g], c.rate_per_s.value()) {
                 return Err(Rejection::Counterexample { index, reason: "the loop at the point decays at the rate" });
             }
+            if let Some(attained) = &c.attained {
+                check_attained(document, &c.point, &c.rate_per_s, attained)?;
+            }
             checked.verdict = Verdict::Refused;
         }
         Claim::NotProved(c) => {
+            if let Some(distance) = &c.distance {
+                require_plain("distance", distance)?;
+            }
             checked.verdict = Verdict::NotProved;
             checked.kind = c.of.kind();
         }

@@ -22,6 +22,8 @@ pub struct Document {
     pub family: Family,
     /// The constants that stand for every member of the family.
     pub constants: Constants,
+    /// Arm, gains, family, scope and constants in words: what every statement below is about.
+    pub about: String,
     /// What is claimed, refused, or not proved.
     pub claims: Vec<Claim>,
     /// SHA-256 of the canonical content with this field empty, lower-case hexadecimal.
@@ -50,8 +52,10 @@ pub struct Family {
     pub friction_n_m_s_per_rad: [Number; 2],
     /// Link masses (and inertias) may differ from the nominal by this share, 0.2 for +-20 %.
     pub mass_uncertainty: Number,
-    /// Payload, `[least, largest]`, kg.
+    /// Payload, a point mass, `[least, largest]`, kg.
     pub payload_kg: [Number; 2],
+    /// Where the payload sits in the frame of the last link, m.
+    pub payload_com_m: [Number; 3],
     /// Rotor inertia of each joint, `[least, largest]`, kg m^2.
     pub rotor_inertia_kg_m2: [Number; 2],
 }
@@ -81,7 +85,7 @@ pub enum Evidence {
     /// Sampling and local maximisation, widened by a margin: no proof.
     Sampled {
         /// Which configurations were sampled.
-        over: String,
+        over: SampledSet,
         /// The constants are this share larger (m_lo: smaller) than what was found.
         margin: Number,
         /// Configurations sampled for each constant.
@@ -89,6 +93,14 @@ pub enum Evidence {
         /// Local maximisations started from the best of them.
         local_starts: usize,
     },
+}
+
+/// Where constants were sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SampledSet {
+    /// Every configuration, joint limits or not.
+    AllAngles,
 }
 
 /// How strong a claim is.
@@ -240,5 +252,39 @@ pub struct NotProvedClaim {
     /// How far the inequalities are from feasible in the solver's units; positive is infeasible.
     pub distance: Option<Number>,
     /// Why no proof was attempted or found.
-    pub reason: String,
+    pub reason: Reason,
+}
+
+/// Why there is neither a proof nor a counterexample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reason {
+    /// The proof needs the same gains on every joint.
+    UnequalGains,
+    /// Stable, but too slowly for the rates that are tried.
+    TooSlow,
+    /// The box is not shown stable, and no unstable point of it was found.
+    NoPointFound,
+    /// The solver found no Lyapunov function.
+    Infeasible,
+    /// What the solver found did not pass the exact check.
+    CandidateFailed,
+    /// A number of the problem is too large or too small to work with.
+    OutOfRange,
+}
+
+impl Reason {
+    /// In words.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::UnequalGains => "this claim needs the same gains on every joint",
+            Self::TooSlow => "the loops of the box are stable, but at no rate of at least 0.001 per s",
+            Self::NoPointFound => "the box is not shown stable, and no unstable point of it was found",
+            Self::Infeasible => {
+                "no Lyapunov function of the claim's form was found, and no counterexample was searched"
+            }
+            Self::CandidateFailed => "the solver's candidates did not pass the exact check",
+            Self::OutOfRange => "a number of the problem is too large or too small to be worked with",
+        }
+    }
 }

@@ -6,6 +6,14 @@ pub enum VerifyError {
     /// Not JSON of the certificate's shape: truncated, a field missing, unknown or of the wrong type.
     #[error("not a certificate: {0}")]
     Unreadable(#[from] serde_json::Error),
+    /// Longer than any certificate.
+    #[error("{found} bytes, a certificate has at most {most}")]
+    Length {
+        /// Bytes of the text.
+        found: usize,
+        /// Most that is read.
+        most: usize,
+    },
     /// Written by another version of the format.
     #[error("certificate schema {found}, this version reads schema {expected}")]
     Schema {
@@ -30,6 +38,19 @@ pub enum Rejection {
     /// A document without claims proves nothing.
     #[error("the document holds no claim")]
     Empty,
+    /// More claims than a document can need.
+    #[error("the document holds {found} claims, expected at most {most}")]
+    Crowded {
+        /// Claims in the file.
+        found: usize,
+        /// Most that are checked.
+        most: usize,
+    },
+    /// The text is not the form in which a document is written.
+    #[error(
+        "the text is not in the form in which certificates are written: a field is missing or spelled in another way"
+    )]
+    Form,
     /// A quantity is outside what the claim's proof allows.
     #[error("{quantity} is {value}, expected {expected}")]
     Quantity {
@@ -55,6 +76,12 @@ pub enum Rejection {
     UnequalGains {
         /// The gain that differs.
         gain: &'static str,
+    },
+    /// The description is not that of the numbers.
+    #[error("the description is not the one its numbers make; they say: {derived}")]
+    About {
+        /// The description derived from the numbers.
+        derived: String,
     },
     /// The words are not those of the numbers.
     #[error("claim {index}: the statement is not the one its numbers make; they say: {derived}")]

@@ -13,11 +13,12 @@
 //! at most 5 in the edge's parameter, whose roots in [0, 1] a Sturm sequence counts. The full derivation, with the case `v = 0`, is in
 //! `proofs/claims/exponential.md`.
 
+use num_bigint::BigInt;
 use num_rational::BigRational;
-use num_traits::{One, Signed, Zero};
+use num_traits::Signed;
 
 use crate::aic::SharedGains;
-use crate::algebra::{Polynomial, characteristic_polynomial, hurwitz_determinant, is_hurwitz, zeros};
+use crate::algebra::{Polynomial, characteristic_polynomial, common_integers, hurwitz_determinant, is_hurwitz, zeros};
 use crate::number::{Number, positive};
 
 const DEGREE: usize = 6;
@@ -65,9 +66,10 @@ fn shifted_polynomial(gains: &SharedGains, [m, d, g]: [&BigRational; 3], rate: &
 /// Whether the one-joint loop at `(m, d, g)` decays faster than `exp(-rate t)`. Exact; `m` must be positive.
 pub fn is_stable_at(gains: &crate::AicGains, [m, d, g]: [&BigRational; 3], rate: &BigRational) -> bool {
     positive(m)
-        && gains
-            .shared(gains.kappa_mu.len())
-            .is_ok_and(|shared| is_hurwitz(&shifted_polynomial(&shared, [m, d, g], rate)))
+        && gains.shared(gains.kappa_mu.len()).is_ok_and(|shared| {
+            let polynomial = common_integers(&[shifted_polynomial(&shared, [m, d, g], rate)]);
+            polynomial.iter().all(|p| is_hurwitz(p))
+        })
 }
 
 /// Whether every linearised loop of the document's family decays faster than `exp(-rate t)`, by exact arithmetic.
@@ -88,9 +90,11 @@ pub(crate) fn decays(gains: &SharedGains, range: &LoopBox, rate: &BigRational) -
         return Err("the box reaches inertia 0, where the degree drops".to_owned());
     }
     // Corner k has bit j set where axis j is at its upper end.
-    let corners: Vec<Vec<BigRational>> = (0..8_usize)
+    let corners: Vec<_> = (0..8_usize)
         .map(|k| shifted_polynomial(gains, [0, 1, 2].map(|j| axes[j][(k >> j) & 1].value()), rate))
         .collect();
+    // One factor for all corners: edges join polynomials in their true proportions.
+    let corners = common_integers(&corners);
     if !is_hurwitz(&corners[0]) {
         return Err("the loop of the least inertia, friction and stiffness does not decay at this rate".to_owned());
     }
@@ -110,17 +114,16 @@ pub(crate) fn decays(gains: &SharedGains, range: &LoopBox, rate: &BigRational) -
 }
 
 /// Whether no polynomial between two of equal positive leading sign has a root on the imaginary axis.
-fn edge_is_stable(from: &[BigRational], to: &[BigRational]) -> bool {
+fn edge_is_stable(from: &[BigInt], to: &[BigInt]) -> bool {
     let both_positive = |index: usize| from[index].is_positive() && to[index].is_positive();
     if !both_positive(0) || !both_positive(DEGREE) {
         return false;
     }
-    let values: Vec<BigRational> = (0..DEGREE)
+    let values: Vec<BigInt> = (0..DEGREE)
         .map(|node| {
-            let x = BigRational::from_integer(node.into());
-            let p: Vec<BigRational> = from.iter().zip(to).map(|(a, b)| a + (b - a) * &x).collect();
+            let p: Vec<BigInt> = from.iter().zip(to).map(|(a, b)| a + (b - a) * node).collect();
             hurwitz_determinant(&p, DEGREE - 1)
         })
         .collect();
-    Polynomial::through(&values).has_no_root_in(&BigRational::zero(), &BigRational::one())
+    Polynomial::through(&values).has_no_root_in_unit_interval()
 }

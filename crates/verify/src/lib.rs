@@ -33,7 +33,7 @@ pub use aic::AicGains;
 pub use check::{Certificate, Checked, Verdict, family_box, seal, verify};
 pub use document::{
     Arm, Attained, BoxPoint, Claim, ClaimKind, Constants, Document, Evidence, ExponentialClaim, Family, Grade,
-    NotProvedClaim, RefusedClaim, RegionClaim, RegionWitness,
+    NotProvedClaim, Reason, RefusedClaim, RegionClaim, RegionWitness, SampledSet,
 };
 pub use error::{Rejection, VerifyError};
 pub use exponential::{LoopBox, is_stable_at, loop_box_decays};

@@ -23,6 +23,8 @@ struct Summary {
     robot: String,
     gains: String,
     family: PlantBox,
+    /// Arm, gains, family, scope and constants in words: what every statement is about.
+    about: String,
     claims: Vec<ClaimSummary>,
     assumptions: Vec<AssumptionSummary>,
     sha256: String,
@@ -53,6 +55,7 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
             robot: robot.name().to_owned(),
             gains: args.gains.clone(),
             family: plant_box,
+            about: certificate.document().about.clone(),
             claims: summaries(&certificate),
             assumptions: certificate.assumptions().into_iter().map(Into::into).collect(),
             sha256: certificate.document().sha256.clone(),

@@ -86,11 +86,9 @@ fn summary(claim: &Claim, checked: &Checked) -> ClaimSummary {
 
 /// The claims for a person: verdict and statement, then, if asked for, what they rest on and how far the inequalities are from failing.
 pub fn claims_in_words(certificate: &Certificate, in_detail: bool) -> String {
-    let mut text = String::new();
+    let mut text = wrapped(&certificate.document().about, 0);
     for claim in summaries(certificate) {
-        if !text.is_empty() {
-            text.push('\n');
-        }
+        text.push('\n');
         let _ = write!(text, "{}: {}", claim.kind, claim.verdict);
         if let Some(grade) = claim.grade {
             let _ = write!(text, " ({grade})");

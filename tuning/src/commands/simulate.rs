@@ -71,8 +71,11 @@ fn run_on<const N: usize>(
     scenario: &Scenario,
     setting: &PlantSetting,
 ) -> Result<(Metrics, Option<String>), Error> {
-    let misfit =
-        |source| Error::ScenarioFit { scenario: scenario.name.clone(), robot: robot.name().to_owned(), source };
+    let misfit = |source| Error::ScenarioFit {
+        scenario: scenario.name.clone(),
+        robot: robot.name().to_owned(),
+        source: Box::new(source),
+    };
     let task = scenario.bind::<N>(robot).map_err(misfit)?;
     let plant = Plant::<N>::new(robot, setting)?;
     let noise = NoiseStream { seed: args.seed.unwrap_or(1), index: 0 };

@@ -56,6 +56,8 @@ struct Summary<'a> {
     files: Vec<String>,
     gains: Option<&'a Gains>,
     held_out: Compared,
+    /// What every statement is about.
+    about: Option<String>,
     claims: Vec<ClaimSummary>,
     elapsed_s: f64,
 }
@@ -97,6 +99,7 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
             files: files.iter().map(|path| path.display().to_string()).collect(),
             gains: run.file.record.tuned(),
             held_out: Compared { published: start.as_ref().map(spread), tuned: tuned.as_ref().map(spread) },
+            about: claims.map(|certificate| certificate.document().about.clone()),
             claims: claims.map(summaries).unwrap_or_default(),
             elapsed_s: progress.elapsed_s(),
         })?;
@@ -165,9 +168,11 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
     let Plan { robot, scenario, question, .. } = plan;
     let seed = question.search.seed;
     let misfit = |error| match error {
-        BatchError::Task(source) => {
-            Error::ScenarioFit { scenario: scenario.name.clone(), robot: robot.name().to_owned(), source }
-        }
+        BatchError::Task(source) => Error::ScenarioFit {
+            scenario: scenario.name.clone(),
+            robot: robot.name().to_owned(),
+            source: Box::new(source),
+        },
         BatchError::NoPlants | BatchError::Plant(_) => Error::Batch(error),
     };
     let objective =
@@ -221,7 +226,7 @@ fn why_not(refusal: &Certificate) -> String {
                 claim.point.friction_n_m_s_per_rad,
                 claim.point.stiffness_n_m_per_rad
             ),
-            Claim::NotProved(claim) => format!("{} not proved: {}", checked.kind, claim.reason),
+            Claim::NotProved(claim) => format!("{} not proved: {}", checked.kind, claim.reason.in_words()),
             Claim::Exponential(_) | Claim::Region(_) => checked.kind.to_owned(),
         });
     reasons.collect::<Vec<_>>().join("; ")

@@ -19,6 +19,8 @@ struct FileSummary {
     /// Why it is rejected or unreadable.
     reason: Option<String>,
     sha256: Option<String>,
+    /// What every statement is about.
+    about: Option<String>,
     claims: Vec<ClaimSummary>,
     assumptions: Vec<AssumptionSummary>,
 }
@@ -44,6 +46,7 @@ fn check(path: &Path, context: Context) -> Result<(Exit, FileSummary), Error> {
         verdict,
         reason: Some(reason),
         sha256: None,
+        about: None,
         claims: Vec::new(),
         assumptions: Vec::new(),
     };
@@ -68,6 +71,7 @@ fn check(path: &Path, context: Context) -> Result<(Exit, FileSummary), Error> {
                 verdict: if exit == Exit::Holds { "holds" } else { "does not hold" },
                 reason: None,
                 sha256: Some(certificate.document().sha256.clone()),
+                about: Some(certificate.document().about.clone()),
                 claims: summaries(&certificate),
                 assumptions: certificate.assumptions().into_iter().map(Into::into).collect(),
             };

@@ -58,7 +58,12 @@ fn grade(grade: verify::Grade) -> Grade {
 }
 
 fn claim_row(claim: &verify::Claim, checked: &Checked, certificate: &Certificate, slowest: Option<f64>) -> Claim {
-    let assumptions = certificate.assumptions().into_iter();
+    let assumptions = certificate
+        .assumptions()
+        .into_iter()
+        .map(|assumption| Assumption { grade: grade(assumption.grade), text: assumption.text });
+    // The statement alone does not say of which arm, gains and plants it speaks.
+    let about = Assumption { text: certificate.document().about.clone(), grade: Grade::Conditional };
     Claim {
         kind: checked.kind.to_owned(),
         verdict: match checked.verdict {
@@ -68,9 +73,7 @@ fn claim_row(claim: &verify::Claim, checked: &Checked, certificate: &Certificate
         },
         grade: checked.grade.map_or(Grade::Sampled, grade),
         statement: checked.statement.clone(),
-        assumptions: assumptions
-            .map(|assumption| Assumption { grade: grade(assumption.grade), text: assumption.text })
-            .collect(),
+        assumptions: std::iter::once(about).chain(assumptions).collect(),
         margins: margins(claim, checked, slowest),
         counterexample: counterexample(claim),
     }

@@ -144,7 +144,7 @@ fn a_scenario_gives_certify_its_family() {
         "certify --robot panda --gains pezzato2020-simulation --scenario pick-and-place --claim exponential";
     let made = json(folder.path(), arguments, 0);
     assert_eq!(made["family"]["payload_kg"][1], 0.7);
-    assert!(made["claims"][0]["statement"].as_str().unwrap().contains("0 to 0.7 kg"));
+    assert!(made["about"].as_str().unwrap().contains("0.7 kg"));
 }
 
 #[test]
