@@ -1,4 +1,5 @@
 //! `claims/region.md` on the Panda: the published simulation gains, gravity compensated, friction 1 to 3 N m s/rad.
+#![expect(clippy::panic, reason = "test helpers")]
 
 use certune::certify::Claims;
 use certune::verify::{Certificate, Claim, Grade};

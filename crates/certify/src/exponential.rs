@@ -1,8 +1,8 @@
 //! The largest certified decay rate of the linearised loops, or a point of the box that contradicts stability.
 
 use certune_verify::{
-    Attained, BoxPoint, Claim, ClaimKind, Document, ExponentialClaim, Grade, LoopBox, NotProvedClaim, Number, Reason,
-    RefusedClaim, family_box, is_stable_at, loop_box_decays,
+    Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, Grade, LoopBox, LoopFamily, NotProvedClaim, Number, Reason,
+    RefusedClaim, family_box,
 };
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -38,9 +38,12 @@ fn rate(steps: u32) -> Option<Number> {
 pub fn exponential(problem: &Problem, attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>) -> Claim {
     let document = problem.document();
     let range = family_box(document);
-    let decays = |steps: u32| rate(steps).is_some_and(|r| loop_box_decays(document, r.value()).is_ok());
+    let Ok(loops) = LoopFamily::new(&document.gains) else {
+        return not_proved(Reason::UnequalGains);
+    };
+    let decays = |steps: u32| rate(steps).is_some_and(|r| loops.decays_on(&range, r.value()).is_ok());
     if !decays(1) {
-        return refuse(document, &range, attain);
+        return refuse(&loops, &range, attain);
     }
     // Stable at rate r implies stable at every smaller rate: bisect between a certified and a refused step.
     let (mut certified, mut refused) = (1, STEPS_PER_UNIT * LARGEST_RATE_PER_S);
@@ -64,22 +67,19 @@ fn not_proved(reason: Reason) -> Claim {
     Claim::NotProved(NotProvedClaim { statement: String::new(), of: ClaimKind::Exponential, distance: None, reason })
 }
 
-fn refuse(document: &Document, range: &LoopBox, attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>) -> Claim {
+fn refuse(loops: &LoopFamily, range: &LoopBox, attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>) -> Claim {
     let zero = BigRational::zero();
-    if loop_box_decays(document, &zero).is_ok() {
+    if loops.decays_on(range, &zero).is_ok() {
         return not_proved(Reason::TooSlow);
     }
     let unstable = |point: &BoxPoint| {
         let values =
             [&point.inertia_kg_m2, &point.friction_n_m_s_per_rad, &point.stiffness_n_m_per_rad].map(Number::value);
-        range.contains(values) && !is_stable_at(&document.gains, values, &zero)
+        range.contains(values) && !loops.is_stable_at(values, &zero)
     };
     let refused = |point: BoxPoint, attained: Option<Attained>| {
         Claim::Refused(Box::new(RefusedClaim { statement: String::new(), rate_per_s: Number::zero(), point, attained }))
     };
-    if document.gains.shared_by_all().is_err() {
-        return not_proved(Reason::UnequalGains);
-    }
     if let Some((found, attained)) = attain()
         && let Some(point) = as_point(found.inertia_kg_m2, found.friction_n_m_s_per_rad, found.stiffness_n_m_per_rad)
             .map(|point| pulled_inside(point, range))

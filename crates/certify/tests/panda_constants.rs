@@ -1,5 +1,5 @@
 //! The Panda's published gains against figures of an independent prototype (cvxpy, floating point), from constants alone.
-#![expect(clippy::unwrap_used, reason = "test helpers")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
 use certune_certify::{
     AicGainValues, ArmValues, Claims, FamilyValues, Problem, RegionOptions, SampledConstantValues, certify,

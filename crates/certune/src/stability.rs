@@ -195,9 +195,15 @@ impl<const N: usize> ArmCertifier<N> {
         if top.value.is_nan() || top.value <= 0.0 {
             return Ok(None);
         }
-        let (member, closed) = self.member_loop(params, &top.at)?;
-        let friction = top.at.last().copied().unwrap_or_default();
-        Ok(self.describe(&member, &closed, &top.at, friction))
+        // Angles that a person can type, if the loop is unstable there as well.
+        let mut short = top.at.clone();
+        for angle in &mut short[..N] {
+            *angle = (*angle * 1e3).round() / 1e3;
+        }
+        let at = if score(&short) > 0.0 { short } else { top.at };
+        let (member, closed) = self.member_loop(params, &at)?;
+        let friction = at.last().copied().unwrap_or_default();
+        Ok(self.describe(&member, &closed, &at, friction))
     }
 
     fn member_loop(
@@ -250,10 +256,15 @@ impl<const N: usize> ArmCertifier<N> {
             payload_kg: decimal(payload)?,
             rotor_inertia_kg_m2: decimal(rotor_lower + fraction * (rotor_upper - rotor_lower))?,
             friction_n_m_s_per_rad: decimal(friction)?,
-            eigenvalue_per_s: [decimal(eigenvalue.re)?, decimal(eigenvalue.im)?],
+            eigenvalue_per_s: [four_digits(eigenvalue.re)?, four_digits(eigenvalue.im)?],
         };
         found.inertia_kg_m2.is_finite().then_some((found, attained))
     }
+}
+
+/// Four significant digits, of something that only illustrates.
+fn four_digits(x: f64) -> Option<Number> {
+    decimal(format!("{x:.3e}").parse().ok()?)
 }
 
 /// The decimal of a search's result; what is zero to rounding is written as zero.

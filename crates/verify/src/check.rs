@@ -7,7 +7,7 @@ use sha2::{Digest, Sha256};
 use crate::aic::SharedGains;
 use crate::document::{Attained, BoxPoint, Claim, Document, Evidence, Grade, RegionClaim};
 use crate::error::{Rejection, VerifyError};
-use crate::exponential::{LoopBox, decays, is_stable_at};
+use crate::exponential::{LoopBox, LoopFamily};
 use crate::number::{Number, positive, unit_interval};
 use crate::region::{ArmConstants, Inequality, Witness, inequalities};
 use crate::statement::{Assumption, about, assumptions, statement};
@@ -375,9 +375,9 @@ fn check_claim(document: &Document, index: usize, claim: &Claim) -> Result<Check
     };
     match claim {
         Claim::Exponential(c) => {
-            let gains = document.gains.shared(document.arm.joints)?;
             require_positive("rate_per_s", &c.rate_per_s)?;
-            decays(&gains, &family_box(document), c.rate_per_s.value())
+            LoopFamily::new(&document.gains)?
+                .decays_on(&family_box(document), c.rate_per_s.value())
                 .map_err(|reason| Rejection::Polynomial { index, reason })?;
         }
         Claim::Region(c) => {
@@ -395,11 +395,10 @@ fn check_claim(document: &Document, index: usize, claim: &Claim) -> Result<Check
             for number in [&c.point.inertia_kg_m2, &c.point.friction_n_m_s_per_rad, &c.point.stiffness_n_m_per_rad] {
                 require_plain("point", number)?;
             }
-            document.gains.shared(document.arm.joints)?;
             if !family_box(document).contains([m, d, g]) {
                 return Err(Rejection::Counterexample { index, reason: "the point lies outside the family's box" });
             }
-            if is_stable_at(&document.gains, [m, d, g], c.rate_per_s.value()) {
+            if LoopFamily::new(&document.gains)?.is_stable_at([m, d, g], c.rate_per_s.value()) {
                 return Err(Rejection::Counterexample { index, reason: "the loop at the point decays at the rate" });
             }
             if let Some(attained) = &c.attained {

@@ -127,7 +127,7 @@ pub enum Claim {
     NotProved(NotProvedClaim),
 }
 
-/// See the [`exponential`](crate::loop_box_decays) check.
+/// See the [`exponential`](crate::LoopFamily::decays_on) check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExponentialClaim {

@@ -17,8 +17,9 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::Signed;
 
-use crate::aic::SharedGains;
+use crate::aic::{AicGains, SharedGains};
 use crate::algebra::{Polynomial, characteristic_polynomial, common_integers, hurwitz_determinant, is_hurwitz, zeros};
+use crate::error::Rejection;
 use crate::number::{Number, positive};
 
 const DEGREE: usize = 6;
@@ -42,8 +43,96 @@ impl LoopBox {
     }
 }
 
-/// Coefficients of `p(s - rate; m, d, g)` from the highest power down; the first is `m`.
-fn shifted_polynomial(gains: &SharedGains, [m, d, g]: [&BigRational; 3], rate: &BigRational) -> Vec<BigRational> {
+/// The polynomials `p(s; m, d, g) = p_0(s) + m p_m(s) + d p_d(s) + g p_g(s)` of all one-joint loops of one set of gains.
+#[derive(Clone, Debug)]
+pub struct LoopFamily {
+    /// p_0, p_m, p_d, p_g, coefficients from the highest power of s down.
+    parts: [Vec<BigRational>; 4],
+}
+
+impl LoopFamily {
+    /// The loops of these gains.
+    ///
+    /// # Errors
+    /// [`Rejection`] when a gain is missing, not positive, or not the same on every joint.
+    pub fn new(gains: &AicGains) -> Result<Self, Rejection> {
+        let shared = gains.shared(gains.kappa_mu.len())?;
+        let at = |m: i64, d: i64, g: i64| polynomial(&shared, [m, d, g].map(|x| BigRational::from_integer(x.into())));
+        let minus = |x: &[BigRational], y: &[BigRational]| x.iter().zip(y).map(|(x, y)| x - y).collect::<Vec<_>>();
+        // Affine in (m, d, g), and m must not vanish: four points tell the four parts.
+        let unit = at(1, 0, 0);
+        let by_inertia = minus(&at(2, 0, 0), &unit);
+        let (by_friction, by_stiffness) = (minus(&at(1, 1, 0), &unit), minus(&at(1, 0, 1), &unit));
+        Ok(Self { parts: [minus(&unit, &by_inertia), by_inertia, by_friction, by_stiffness] })
+    }
+
+    /// The four parts after the substitution `s -> s - rate`.
+    fn shifted(&self, rate: &BigRational) -> [Vec<BigRational>; 4] {
+        self.parts.clone().map(|mut p| {
+            // Repeated synthetic division at -rate (Taylor shift).
+            for last in (1..p.len()).rev() {
+                for k in 1..=last {
+                    let carried = &p[k - 1] * rate;
+                    p[k] -= carried;
+                }
+            }
+            p
+        })
+    }
+
+    /// Whether the one-joint loop at (inertia, friction, stiffness) decays faster than `exp(-rate t)`. Exact.
+    pub fn is_stable_at(&self, point: [&BigRational; 3], rate: &BigRational) -> bool {
+        positive(point[0])
+            && common_integers(&[combined(&self.shifted(rate), point)]).iter().all(|polynomial| is_hurwitz(polynomial))
+    }
+
+    /// Whether every loop of the box decays faster than `exp(-rate t)`, by exact arithmetic.
+    ///
+    /// # Errors
+    /// Where the proof stops, in words.
+    pub fn decays_on(&self, range: &LoopBox, rate: &BigRational) -> Result<(), String> {
+        let axes = [&range.inertia, &range.friction, &range.stiffness];
+        if axes.iter().any(|[lower, upper]| lower.value() > upper.value()) {
+            return Err("the box is empty".to_owned());
+        }
+        if !positive(range.inertia[0].value()) {
+            return Err("the box reaches inertia 0, where the degree drops".to_owned());
+        }
+        // Corner k has bit j set where axis j is at its upper end.
+        let parts = self.shifted(rate);
+        let corners: Vec<_> =
+            (0..8_usize).map(|k| combined(&parts, [0, 1, 2].map(|j| axes[j][(k >> j) & 1].value()))).collect();
+        // One factor for all corners: edges join polynomials in their true proportions.
+        let corners = common_integers(&corners);
+        if !is_hurwitz(&corners[0]) {
+            return Err("the loop of the least inertia, friction and stiffness does not decay at this rate".to_owned());
+        }
+        for from in 0..8_usize {
+            for (j, axis) in axes.iter().enumerate() {
+                if from >> j & 1 == 1 || axis[0].value() == axis[1].value() {
+                    continue;
+                }
+                let to = from | 1 << j;
+                if !edge_is_stable(&corners[from], &corners[to]) {
+                    let name = ["inertia", "friction", "stiffness"][j];
+                    return Err(format!("a root reaches the boundary along an edge of the box in {name}"));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// `p_0 + m p_m + d p_d + g p_g`.
+fn combined(parts: &[Vec<BigRational>; 4], [m, d, g]: [&BigRational; 3]) -> Vec<BigRational> {
+    let [constant, by_inertia, by_friction, by_stiffness] = parts;
+    (0..constant.len())
+        .map(|k| &constant[k] + &by_inertia[k] * m + &by_friction[k] * d + &by_stiffness[k] * g)
+        .collect()
+}
+
+/// Coefficients of `p(s; m, d, g) = m det(s I - A6)` from the highest power down; the first is `m`, which must not be 0.
+fn polynomial(gains: &SharedGains, [m, d, g]: [BigRational; 3]) -> Vec<BigRational> {
     let controller = gains.matrices();
     // States e, dq, m, mu', mu'', u~: the controller's five with dq inserted after e.
     let place = |k: usize| if k == 0 { 0 } else { k + 1 };
@@ -54,63 +143,10 @@ fn shifted_polynomial(gains: &SharedGains, [m, d, g]: [&BigRational; 3], rate: &
         }
         a[place(i)][1].clone_from(&controller.b[i]);
     }
-    a[1][0] = -g / m;
-    a[1][1] = -d / m;
+    a[1][0] = -g / &m;
+    a[1][1] = -d / &m;
     a[1][5] = m.recip();
-    for (k, row) in a.iter_mut().enumerate() {
-        row[k] += rate;
-    }
-    characteristic_polynomial(&a).into_iter().map(|c| c * m).collect()
-}
-
-/// Whether the one-joint loop at `(m, d, g)` decays faster than `exp(-rate t)`. Exact; `m` must be positive.
-pub fn is_stable_at(gains: &crate::AicGains, [m, d, g]: [&BigRational; 3], rate: &BigRational) -> bool {
-    positive(m)
-        && gains.shared(gains.kappa_mu.len()).is_ok_and(|shared| {
-            let polynomial = common_integers(&[shifted_polynomial(&shared, [m, d, g], rate)]);
-            polynomial.iter().all(|p| is_hurwitz(p))
-        })
-}
-
-/// Whether every linearised loop of the document's family decays faster than `exp(-rate t)`, by exact arithmetic.
-///
-/// # Errors
-/// Where the proof stops, in words.
-pub fn loop_box_decays(document: &crate::Document, rate: &BigRational) -> Result<(), String> {
-    let shared = document.gains.shared(document.arm.joints).map_err(|e| e.to_string())?;
-    decays(&shared, &crate::check::family_box(document), rate)
-}
-
-pub(crate) fn decays(gains: &SharedGains, range: &LoopBox, rate: &BigRational) -> Result<(), String> {
-    let axes = [&range.inertia, &range.friction, &range.stiffness];
-    if axes.iter().any(|[lower, upper]| lower.value() > upper.value()) {
-        return Err("the box is empty".to_owned());
-    }
-    if !positive(range.inertia[0].value()) {
-        return Err("the box reaches inertia 0, where the degree drops".to_owned());
-    }
-    // Corner k has bit j set where axis j is at its upper end.
-    let corners: Vec<_> = (0..8_usize)
-        .map(|k| shifted_polynomial(gains, [0, 1, 2].map(|j| axes[j][(k >> j) & 1].value()), rate))
-        .collect();
-    // One factor for all corners: edges join polynomials in their true proportions.
-    let corners = common_integers(&corners);
-    if !is_hurwitz(&corners[0]) {
-        return Err("the loop of the least inertia, friction and stiffness does not decay at this rate".to_owned());
-    }
-    for from in 0..8_usize {
-        for (j, axis) in axes.iter().enumerate() {
-            if from >> j & 1 == 1 || axis[0].value() == axis[1].value() {
-                continue;
-            }
-            let to = from | 1 << j;
-            if !edge_is_stable(&corners[from], &corners[to]) {
-                let name = ["inertia", "friction", "stiffness"][j];
-                return Err(format!("a root reaches the boundary along an edge of the box in {name}"));
-            }
-        }
-    }
-    Ok(())
+    characteristic_polynomial(&a).into_iter().map(|c| c * &m).collect()
 }
 
 /// Whether no polynomial between two of equal positive leading sign has a root on the imaginary axis.
@@ -126,4 +162,43 @@ fn edge_is_stable(from: &[BigInt], to: &[BigInt]) -> bool {
         })
         .collect();
     Polynomial::through(&values).has_no_root_in_unit_interval()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::number::ratio;
+    use proptest::prelude::*;
+
+    fn gains(values: [u32; 7]) -> AicGains {
+        let list = |k: usize| vec![format!("{}.{}", values[k] / 10, values[k] % 10).parse().unwrap()];
+        AicGains {
+            kappa_mu: list(0),
+            kappa_a: list(1),
+            sigma_q: list(2),
+            sigma_dq: list(3),
+            sigma_mu: list(4),
+            sigma_dmu: list(5),
+            reference_time_constant_s: list(6),
+        }
+    }
+
+    proptest! {
+        /// The parts and the shift against the determinant itself, at random points and rates.
+        #[test]
+        fn the_family_is_the_determinant(values in prop::array::uniform7(1_u32..300), point in (1_i64..90, 0_i64..90, -90_i64..90), rate in 0_i64..30) {
+            let gains = gains(values);
+            let shared = gains.shared(1).unwrap();
+            let [m, d, g] = [point.0, point.1, point.2].map(|x| ratio(x, 7));
+            let rate = ratio(rate, 11);
+            let family = LoopFamily::new(&gains).unwrap();
+            let shifted = combined(&family.shifted(&rate), [&m, &d, &g]);
+            let direct = polynomial(&shared, [m, d, g]);
+            let value = |p: &[BigRational], s: &BigRational| p.iter().fold(ratio(0, 1), |sum, c| sum * s + c);
+            for s in 0..8 {
+                let s = ratio(s, 3);
+                prop_assert_eq!(value(&shifted, &s), value(&direct, &(&s - &rate)));
+            }
+        }
+    }
 }

@@ -36,7 +36,7 @@ pub use document::{
     NotProvedClaim, Reason, RefusedClaim, RegionClaim, RegionWitness, SampledSet,
 };
 pub use error::{Rejection, VerifyError};
-pub use exponential::{LoopBox, is_stable_at, loop_box_decays};
+pub use exponential::{LoopBox, LoopFamily};
 pub use number::{Number, NumberError};
 pub use region::{Inequality, region_inequalities};
 pub use statement::Assumption;

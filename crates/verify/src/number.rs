@@ -62,6 +62,9 @@ impl Number {
 
     /// The number with the other sign.
     pub(crate) fn negated(&self) -> Self {
+        if self.value.is_zero() {
+            return Self::zero();
+        }
         let text = match self.text.strip_prefix('-') {
             Some(positive) => positive.to_owned(),
             None => format!("-{}", self.text),

@@ -23,7 +23,7 @@
 //! The derivation is in `proofs/claims/region.md`.
 
 use num_rational::BigRational;
-use num_traits::{One, Signed, Zero};
+use num_traits::{One, Signed};
 
 use crate::aic::{STATES, SharedGains};
 use crate::algebra::{Matrix, add_symmetric, positive_definite_pivots, zeros};

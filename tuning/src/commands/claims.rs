@@ -94,9 +94,9 @@ pub fn claims_in_words(certificate: &Certificate, in_detail: bool) -> String {
             let _ = write!(text, " ({grade})");
         }
         if let Some(radius) = claim.radius_rad {
-            let _ = write!(text, ", radius {radius:.4} rad");
+            let _ = write!(text, ", radius {radius} rad");
         } else if let Some(rate) = claim.rate_per_s {
-            let _ = write!(text, ", rate {rate:.4} /s");
+            let _ = write!(text, ", rate {rate} /s");
         }
         let _ = writeln!(text);
         text.push_str(&wrapped(&claim.statement, 2));

@@ -107,29 +107,22 @@ fn margins(claim: &verify::Claim, checked: &Checked, slowest: Option<f64>) -> Ve
     margins
 }
 
+/// What a refusal's statement leaves out: the arm that the search found.
 fn counterexample(claim: &verify::Claim) -> Vec<String> {
     let refused = match claim {
         verify::Claim::Refused(refused) => refused,
         verify::Claim::Exponential(_) | verify::Claim::Region(_) | verify::Claim::NotProved(_) => return Vec::new(),
     };
-    let point = &refused.point;
-    let mut sentences = vec![format!(
-        "The loop with inertia {} kg m², friction {} N m s/rad and gravity stiffness {} N m/rad is not stable (exact).",
-        point.inertia_kg_m2, point.friction_n_m_s_per_rad, point.stiffness_n_m_per_rad
-    )];
-    match &refused.attained {
-        Some(attained) => {
-            let q: Vec<String> = attained.q_rad.iter().map(ToString::to_string).collect();
-            let [re, im] = &attained.eigenvalue_per_s;
-            sentences.push(format!(
-                "An arm of the family is there at q = [{}] rad, payload {} kg; its eigenvalue is {re} and imaginary part {im} 1/s.",
-                q.join(", "),
-                attained.payload_kg
-            ));
-        }
-        None => sentences.push("No arm of the family was found at that point.".to_owned()),
-    }
-    sentences
+    refused.attained.iter().map(|arm| {
+        let scales: Vec<String> = arm.link_mass_scale.iter().map(ToString::to_string).collect();
+        format!(
+            "The arm that the search found there: link masses [{}] of nominal, payload {} kg, rotor inertia {} kg m², friction {} N m s/rad.",
+            scales.join(", "),
+            arm.payload_kg,
+            arm.rotor_inertia_kg_m2,
+            arm.friction_n_m_s_per_rad
+        )
+    }).collect()
 }
 
 /// The distance of each goal from the one before, as the region's claim measures it.
