@@ -1,4 +1,4 @@
-//! The Panda's published gains against figures of an independent prototype (cvxpy, floating point), from constants alone.
+//! The Panda's published gains from constants alone, against figures computed once with cvxpy in floating point.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
 use certune_certify::{
@@ -66,7 +66,7 @@ fn a_weak_torque_gain_without_compensation_is_refused() {
 }
 
 #[test]
-fn radii_agree_with_the_prototype() {
+fn radii_agree_with_cvxpy() {
     for (compensated, friction, least) in
         [(true, [1.0, 3.0], 0.80), (true, [0.0, 0.0], 0.33), (false, [1.0, 3.0], 0.25), (true, [1.0, 1.0], 0.80)]
     {

@@ -9,7 +9,7 @@ use num_traits::{Float, One, Zero};
 /// A real number as the recursions see it: the four operations, a square root, an angle's sine and cosine.
 ///
 /// `f64` is the scalar of a single arm. A bundle of lanes, or a scalar that counts its operations, implements the same
-/// few functions and runs the same source: comparisons are therefore absent, and [`Real::clamp`] and [`Real::abs`] stand for the
+/// few functions and runs the same source: comparisons are therefore absent, and [`Real::clamp_symmetric`] and [`Real::abs`] stand for the
 /// only two decisions a control loop takes.
 pub trait Real:
     nalgebra::Scalar
