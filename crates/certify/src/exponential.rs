@@ -72,21 +72,25 @@ fn refuse(loops: &LoopFamily, range: &LoopBox, attain: &dyn Fn() -> Option<(Unst
     if loops.decays_on(range, &zero).is_ok() {
         return not_proved(Reason::TooSlow);
     }
-    let unstable = |point: &BoxPoint| {
-        let values =
-            [&point.inertia_kg_m2, &point.friction_n_m_s_per_rad, &point.stiffness_n_m_per_rad].map(Number::value);
-        range.contains(values) && !loops.is_stable_at(values, &zero)
-    };
+    let unstable =
+        |point: &BoxPoint| range.contains(coordinates(point)) && !loops.is_stable_at(coordinates(point), &zero);
     let refused = |point: BoxPoint, attained: Option<Attained>| {
         Claim::Refused(Box::new(RefusedClaim { statement: String::new(), rate_per_s: Number::zero(), point, attained }))
     };
-    if let Some((found, attained)) = attain()
-        && let Some(point) = as_point(found.inertia_kg_m2, found.friction_n_m_s_per_rad, found.stiffness_n_m_per_rad)
-            .map(|point| pulled_inside(point, range))
-        && unstable(&point)
-    {
-        let friction_n_m_s_per_rad = point.friction_n_m_s_per_rad.clone();
-        return refused(point, Some(Attained { friction_n_m_s_per_rad, ..attained }));
+    if let Some((found, attained)) = attain() {
+        let values = [found.inertia_kg_m2, found.friction_n_m_s_per_rad, found.stiffness_n_m_per_rad];
+        let Some(point) = as_point(values).map(|point| pulled_inside(point, range)) else {
+            return not_proved(Reason::OutOfRange);
+        };
+        if !range.contains(coordinates(&point)) {
+            return not_proved(Reason::ConstantsContradicted);
+        }
+        // Few digits if the loop is unstable there as well.
+        let short = as_point(values.map(|x| format!("{x:.3e}").parse().unwrap_or(x)));
+        if let Some(point) = short.into_iter().chain([point]).find(unstable) {
+            let friction_n_m_s_per_rad = point.friction_n_m_s_per_rad.clone();
+            return refused(point, Some(Attained { friction_n_m_s_per_rad, ..attained }));
+        }
     }
     match grid(range).find(unstable) {
         Some(point) => refused(point, None),
@@ -94,7 +98,11 @@ fn refuse(loops: &LoopFamily, range: &LoopBox, attain: &dyn Fn() -> Option<(Unst
     }
 }
 
-fn as_point(m: f64, d: f64, g: f64) -> Option<BoxPoint> {
+fn coordinates(point: &BoxPoint) -> [&BigRational; 3] {
+    [&point.inertia_kg_m2, &point.friction_n_m_s_per_rad, &point.stiffness_n_m_per_rad].map(Number::value)
+}
+
+fn as_point([m, d, g]: [f64; 3]) -> Option<BoxPoint> {
     Some(BoxPoint {
         inertia_kg_m2: Number::decimal(m)?,
         friction_n_m_s_per_rad: Number::decimal(d)?,
@@ -125,10 +133,10 @@ fn grid(range: &LoopBox) -> impl Iterator<Item = BoxPoint> {
     let (m, d, g) = (ends(&range.inertia), ends(&range.friction), ends(&range.stiffness));
     let share = |k: u32| f64::from(k) / f64::from(GRID);
     let linear = move |[lower, upper]: [f64; 2], k: u32| lower + (upper - lower) * share(k);
-    let corners = (0..8_usize).filter_map(move |k| as_point(m[k & 1], d[k >> 1 & 1], g[k >> 2]));
+    let corners = (0..8_usize).filter_map(move |k| as_point([m[k & 1], d[k >> 1 & 1], g[k >> 2]]));
     let inside = (0..=GRID).flat_map(move |i| {
         (0..=GRID).flat_map(move |j| {
-            (0..=GRID).filter_map(move |k| as_point(m[0] * (m[1] / m[0]).powf(share(i)), linear(d, j), linear(g, k)))
+            (0..=GRID).filter_map(move |k| as_point([m[0] * (m[1] / m[0]).powf(share(i)), linear(d, j), linear(g, k)]))
         })
     });
     corners.chain(inside)

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::claims::{self, Tone};
 use crate::format;
-use crate::record::{PlantRow, RegionRecord, SegmentMetrics, SegmentRow, TuningReport};
+use crate::record::{PlantRow, RegionRecord, SegmentMetrics, SegmentRow, TuningReport, Verdict};
 
 /// The first screen.
 #[derive(Debug, Serialize)]
@@ -50,7 +50,7 @@ pub(crate) fn answer(record: &TuningReport) -> Answer {
     let tally = tally(&record.held_out.plants);
     let (tone, stability) = claims::in_one_line(&record.certificate);
     Answer {
-        headline: headline(&format::sentence(&record.asked.robot), settling),
+        headline: headline(record, settling, &tally),
         held_out: held_out(&tally, &record.asked.cost.unit),
         warnings: warnings(record),
         stability,
@@ -59,7 +59,26 @@ pub(crate) fn answer(record: &TuningReport) -> Answer {
     }
 }
 
-fn headline(robot: &str, settling: (Option<f64>, Option<f64>)) -> String {
+fn headline(record: &TuningReport, settling: (Option<f64>, Option<f64>), tally: &Tally) -> String {
+    let robot = format::sentence(&record.asked.robot);
+    let claims = &record.certificate.claims;
+    if claims.is_empty() || claims.iter().any(|claim| claim.verdict != Verdict::Holds) {
+        return format!("{robot}: no gains were certified");
+    }
+    let moves =
+        record.certificate.region.as_ref().is_none_or(|region| region.steps.iter().any(|step| step.size_rad > 0.0));
+    if let (false, (Some(published), Some(tuned))) = (moves, tally.median) {
+        let cost = |value| format::with_unit(value, &record.asked.cost.unit);
+        return format!(
+            "{robot}: tuned gains hold the arm at a cost of {} instead of {}",
+            cost(tuned),
+            cost(published)
+        );
+    }
+    settling_headline(&robot, settling)
+}
+
+fn settling_headline(robot: &str, settling: (Option<f64>, Option<f64>)) -> String {
     let seconds = |value| format::with_unit(value, "s");
     match settling {
         (Some(published), Some(tuned)) if tuned < published * (1.0 - SAME) => {
@@ -252,11 +271,11 @@ mod tests {
 
     #[test]
     fn the_headline_never_calls_a_worse_result_better() {
-        assert!(headline("panda", (Some(4.1), Some(3.1))).contains("3.10\u{a0}s instead of 4.10\u{a0}s"));
-        assert!(headline("panda", (Some(4.1), Some(4.1))).contains("as the published gains do"));
-        assert!(headline("panda", (Some(3.1), Some(4.1))).contains("slower than"));
-        assert!(headline("panda", (None, Some(4.1))).ends_with("the published gains do not"));
-        assert!(headline("panda", (Some(4.1), None)).contains("do not settle every move"));
-        assert!(headline("panda", (None, None)).contains("neither"));
+        assert!(settling_headline("panda", (Some(4.1), Some(3.1))).contains("3.10\u{a0}s instead of 4.10\u{a0}s"));
+        assert!(settling_headline("panda", (Some(4.1), Some(4.1))).contains("as the published gains do"));
+        assert!(settling_headline("panda", (Some(3.1), Some(4.1))).contains("slower than"));
+        assert!(settling_headline("panda", (None, Some(4.1))).ends_with("the published gains do not"));
+        assert!(settling_headline("panda", (Some(4.1), None)).contains("do not settle every move"));
+        assert!(settling_headline("panda", (None, None)).contains("neither"));
     }
 }

@@ -16,8 +16,6 @@ pub(crate) struct ClaimView<'a> {
     tone: Tone,
     /// The verdict with its grade.
     badge: &'static str,
-    /// What the statement is: a result, or what was to be shown.
-    lead: &'static str,
     statement: &'a str,
     counterexample: &'a [String],
     assumptions: Vec<AssumptionView<'a>>,
@@ -107,7 +105,6 @@ fn view(claim: &Claim) -> ClaimView<'_> {
         kind: &claim.kind,
         tone,
         badge,
-        lead: if claim.verdict == Verdict::Holds { "" } else { "This was to be shown, and was not: " },
         statement: &claim.statement,
         counterexample: &claim.counterexample,
         assumptions: claim.assumptions.iter().map(assumption).collect(),

@@ -297,7 +297,7 @@ pub struct Claim {
     pub verdict: Verdict,
     /// What the evidence is worth.
     pub grade: Grade,
-    /// The statement in words; for a claim that does not hold, what was to be shown.
+    /// The statement in words; for a claim that does not hold, what was found instead.
     pub statement: String,
     /// What the statement rests on.
     pub assumptions: Vec<Assumption>,

@@ -269,6 +269,8 @@ pub enum Reason {
     Infeasible,
     /// What the solver found did not pass the exact check.
     CandidateFailed,
+    /// An arm of the family was found outside the stated constants.
+    ConstantsContradicted,
     /// A number of the problem is too large or too small to work with.
     OutOfRange,
 }
@@ -284,6 +286,9 @@ impl Reason {
                 "no Lyapunov function of the claim's form was found, and no counterexample was searched"
             }
             Self::CandidateFailed => "the solver's candidates did not pass the exact check",
+            Self::ConstantsContradicted => {
+                "a search found an arm of the family outside the stated constants: they do not hold, and nothing is claimed"
+            }
             Self::OutOfRange => "a number of the problem is too large or too small to be worked with",
         }
     }
