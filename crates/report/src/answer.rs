@@ -148,7 +148,7 @@ fn warnings(record: &TuningReport) -> Vec<String> {
             Some(radius) if outside > 0 => warnings.push(format!(
                 "{outside} of {moves} moves of the scenario start farther from the goal than the certified radius of {}: \
                  for those, simulation is the evidence.",
-                format::with_unit(radius, "rad")
+                format::certified(radius, "rad")
             )),
             None | Some(_) => {}
         }
@@ -160,6 +160,9 @@ fn tiles(record: &TuningReport, settling: (Option<f64>, Option<f64>), tally: &Ta
     let unit = &record.asked.cost.unit;
     let show = |value: Option<f64>, unit: &str, none: &str| {
         value.map_or_else(|| none.to_owned(), |value| format::with_unit(value, unit))
+    };
+    let certified = |value: Option<f64>, unit: &str| {
+        value.map_or_else(|| "none".to_owned(), |value| format::certified(value, unit))
     };
     let mut tiles = vec![Tile {
         label: "Slowest move settles in",
@@ -179,7 +182,7 @@ fn tiles(record: &TuningReport, settling: (Option<f64>, Option<f64>), tally: &Ta
         let inside = covered(region);
         tiles.push(Tile {
             label: "Certified starting error",
-            tuned: show(region.radius_rad, "rad", "none"),
+            tuned: certified(region.radius_rad, "rad"),
             published: None,
             note: format!("covers {inside} of {} moves", region.steps.len()),
         });
@@ -187,7 +190,7 @@ fn tiles(record: &TuningReport, settling: (Option<f64>, Option<f64>), tally: &Ta
     if let Some(map) = &record.certificate.pole_map {
         tiles.push(Tile {
             label: "Certified decay rate",
-            tuned: show(map.certified_rate_per_s, "/s", "none"),
+            tuned: certified(map.certified_rate_per_s, "/s"),
             published: None,
             note: "of the linearised loop".to_owned(),
         });

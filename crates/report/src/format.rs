@@ -42,6 +42,27 @@ pub(crate) fn with_unit(value: f64, unit: &str) -> String {
     if unit.is_empty() || value.is_nan() { number(value) } else { format!("{}\u{a0}{unit}", number(value)) }
 }
 
+/// The largest number of three significant digits that is not above a positive `value`; other numbers as they are.
+pub(crate) fn rounded_down(value: f64) -> f64 {
+    if !(value > 0.0 && value.is_finite()) {
+        return value;
+    }
+    // The exponent of the value, not of its neighbour above: 0.9999 is 9.999e-1.
+    let exact = format!("{value:e}");
+    let exponent = exact.split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok());
+    let nearest = format!("{value:.*e}", (DIGITS - 1) as usize).parse::<f64>();
+    match (nearest, exponent) {
+        (Ok(above), Some(exponent)) if above > value => above - 10_f64.powi(exponent - DIGITS + 1),
+        (Ok(below), _) => below,
+        (Err(_), _) => value,
+    }
+}
+
+/// A certified number with its unit, rounded down: the figure above it would be a claim that nobody has proved.
+pub(crate) fn certified(value: f64, unit: &str) -> String {
+    with_unit(rounded_down(value), unit)
+}
+
 /// Label of a tick: as many decimals as the distance to the next tick needs.
 pub(crate) fn tick(value: f64, step: f64) -> String {
     let decimals = (-(step.log10() + 1e-9).floor()).clamp(0.0, 9.0) as usize;
@@ -94,6 +115,16 @@ fn superscript(exponent: i32) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_certified_number_is_never_rounded_up() {
+        for (value, shown) in
+            [(0.2625, "0.262"), (0.58, "0.580"), (1.0, "1.00"), (0.9999, "0.999"), (12.345, "12.3"), (1999.6, "1990")]
+        {
+            assert_eq!(number(rounded_down(value)), shown);
+            assert!(rounded_down(value) <= value * (1.0 + f64::EPSILON));
+        }
+    }
 
     #[test]
     fn numbers_carry_three_significant_digits() {

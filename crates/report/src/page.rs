@@ -72,6 +72,8 @@ pub(crate) fn render(record: &TuningReport) -> Result<String, ReportError> {
     environment.add_filter("milli", |value: Option<f64>| format::optional(value.map(|value| 1e3 * value)));
     environment.add_filter("percent", |value: Option<f64>| format::optional(value.map(|value| 100.0 * value)));
     environment.add_filter("chosen", format::chosen);
+    // Margins are figures of a claim: never above what was found.
+    environment.add_filter("rounded_down", |value: Option<f64>| value.map(format::rounded_down));
     environment.add_filter("exact", |value: f64| format!("{value}"));
     environment.add_filter("sentence", |text: String| format::sentence(&text));
     environment.add_template("report.html", TEMPLATE)?;

@@ -159,3 +159,12 @@ fn lists_name_what_is_built_in() {
         assert!(entries.iter().all(|entry| !entry["description"].as_str().unwrap().is_empty()));
     }
 }
+
+/// The recorded result of the main job is still accepted.
+#[test]
+fn the_recorded_certificate_verifies() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorded = concat!(env!("CARGO_MANIFEST_DIR"), "/results/panda-aic-1/certificate.json");
+    let checked = stdout(folder.path(), &format!("verify {recorded}"), 0);
+    assert!(checked.contains("exponential: holds (conditional)") && checked.contains("region: holds (conditional)"));
+}

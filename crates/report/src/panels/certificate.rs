@@ -49,7 +49,7 @@ fn pole_figure(map: &PoleMap, title: &str, (left, right): (f64, f64)) -> Result<
         marks.push(Mark::Vertical { ink: Ink::Certified, x: -rate });
         // Written where the line is not crossed by it: left of the line in the close view only.
         if rate > 0.1 * (right - left) {
-            let text = format!("certified: {} /s", format::number(rate));
+            let text = format!("certified: {}", format::certified(rate, "/s"));
             let at = (-rate, y_range.1);
             marks.push(Mark::Label { ink: Ink::Certified, text, at, shift: (-5.0, 8.0), anchor: Anchor::End });
         }
@@ -98,7 +98,7 @@ pub(super) fn region(certificate: &CertificateRecord) -> Result<Option<String>, 
     if let Some(radius) = radius {
         marks.push(Mark::Vertical { ink: Ink::Certified, x: radius });
     }
-    let edge = radius.map_or_else(|| "none".to_owned(), |radius| format::with_unit(radius, "rad"));
+    let edge = radius.map_or_else(|| "none".to_owned(), |radius| format::certified(radius, "rad"));
     Plot {
         title: format!("Certified radius ({edge}) against the moves"),
         description: "One bar for each move of the scenario; the shaded area is covered by the claim.".to_owned(),
