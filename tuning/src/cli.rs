@@ -22,7 +22,7 @@ Examples:
 
 Exit codes: 0 every claim holds (conditional ones included), 2 a claim is refused, not proved or rejected, 1 usage, an unreadable file or any other error.";
 
-/// Tune the gains of a robot-arm controller, prove that the result is stable, and report.
+/// Tune the gains of a robot-arm controller, certify its stability, and report.
 #[derive(Debug, Parser)]
 #[command(name = "autotune", version, after_help = AFTER_HELP, subcommand_negates_reqs = true, arg_required_else_help = true)]
 #[command(disable_help_subcommand = true)]
@@ -50,7 +50,7 @@ pub struct Context {
 pub enum Command {
     /// Search for gains, certify the best and write a report (the default command)
     Tune(TuneArgs),
-    /// Prove that an arm with given gains is stable, or say why not
+    /// Certify that an arm with given gains is stable, or say why not
     Certify(CertifyArgs),
     /// Check certificates again, in exact arithmetic, from the files alone
     Verify(VerifyArgs),

@@ -1,4 +1,4 @@
-//! `autotune`: tune the gains of a robot-arm controller, prove that the result is stable, and report.
+//! `autotune`: tune the gains of a robot-arm controller, certify its stability, and report.
 //!
 //! | module | what it holds |
 //! |--------|---------------|
