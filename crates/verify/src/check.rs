@@ -288,15 +288,6 @@ pub fn family_box(document: &Document) -> LoopBox {
     }
 }
 
-/// Gravity stiffness that acts on the loop: none where the robot compensates gravity.
-fn stiffness(document: &Document) -> BigRational {
-    if document.family.gravity_compensation {
-        BigRational::zero()
-    } else {
-        document.constants.k_g_n_m_per_rad.value().clone()
-    }
-}
-
 pub(crate) fn region_parts(
     document: &Document,
     claim: &RegionClaim,
@@ -304,10 +295,12 @@ pub(crate) fn region_parts(
     check_quantities(document)?;
     let gains = document.gains.shared(document.arm.joints)?;
     let constants = &document.constants;
+    let LoopBox { inertia, friction, stiffness: [_, stiffness] } = family_box(document);
+    let values = |interval: [Number; 2]| interval.map(|end| end.value().clone());
     let arm = ArmConstants {
-        inertia: [constants.m_lo_kg_m2.value().clone(), constants.m_hi_kg_m2.value().clone()],
-        friction: document.family.friction_n_m_s_per_rad.clone().map(|x| x.value().clone()),
-        stiffness: stiffness(document),
+        inertia: values(inertia),
+        friction: values(friction),
+        stiffness: stiffness.value().clone(),
         coriolis: constants.k_c_kg_m2.value().clone(),
         coriolis_relative: constants.k_r.value().clone(),
     };
