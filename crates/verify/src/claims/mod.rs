@@ -1,5 +1,6 @@
 //! The kinds of claims. Each file holds what one kind states, its words, and its proof.
 
+mod energy;
 mod exponential;
 mod not_proved;
 mod refused;
@@ -13,10 +14,11 @@ use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
 
+pub use energy::{Energy, TRIANGLE, triangle};
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
 pub use not_proved::{NotProvedClaim, Reason};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
-pub use region::{RegionClaim, RegionWitness, region_inequalities};
+pub use region::{RegionClaim, RegionPoint, RegionProblem, RegionWitness, State, region_inequalities};
 
 /// What an entry of a document claims.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
