@@ -8,8 +8,8 @@
 //! which the solver loses digits.
 
 use certune_verify::{
-    Claim, ClaimKind, ConfigurationSet, Document, Energy, Form, Number, Reason, RegionClaim, RegionPoint,
-    RegionProblem, RegionWitness, STATES, State, TRIANGLE, region_inequalities, triangle,
+    Claim, ClaimKind, ConfigurationSet, Document, Energy, Form, Number, Point, Reason, RegionClaim, RegionProblem,
+    RegionWitness, STATES, State, TRIANGLE, region_inequalities, triangle,
 };
 use nalgebra::DMatrix;
 use num_traits::ToPrimitive;
@@ -151,7 +151,7 @@ impl Search {
     fn new(document: &Document, limits: Limits) -> Option<Self> {
         let problem = RegionProblem::new(document).ok()?.map(|x| x.to_f64().unwrap_or(f64::NAN));
         let torque_unit = 5.0 * document.gains.aic().ok()?.kappa_a.first()?.to_f64().sqrt();
-        let controller = &problem.controller;
+        let controller = &problem.plant.controller;
         let finite = controller.a.iter().flatten().chain(&controller.b).chain([&torque_unit]).all(|x| x.is_finite());
         finite.then_some(Self { problem, torque_unit, limits })
     }
@@ -162,26 +162,26 @@ impl Search {
     }
 
     /// The program's point in the checker's units.
-    fn point(&self, x: &[f64]) -> RegionPoint<f64> {
+    fn point(&self, x: &[f64]) -> Point<f64> {
         let mut s = [0.0; TRIANGLE];
         for i in 0..STATES {
             for j in i..STATES {
                 s[triangle(i, j)] = x[S + triangle(i, j)] / (self.unit(i) * self.unit(j));
             }
         }
-        RegionPoint {
+        Point {
             energy: Energy { p: x[P], b: std::array::from_fn(|k| x[B + k] / self.unit(k)), s },
             rho_squared: x[RHO_SQUARED],
             absolute: x[ABSOLUTE],
             relative: x[RELATIVE],
-            friction_multiplier: x[FRICTION],
+            interval_multiplier: x[FRICTION],
             gravity_multiplier: x[GRAVITY],
             start_multiplier: x[START] / self.stiffness_unit().powi(2),
         }
     }
 
     fn stiffness_unit(&self) -> f64 {
-        if self.problem.has_gravity { self.problem.stiffness } else { 1.0 }
+        if self.problem.plant.has_gravity { self.problem.plant.stiffness } else { 1.0 }
     }
 
     /// Units of (dq, z).
@@ -203,8 +203,8 @@ impl Search {
         if problem.has_friction {
             units.push((problem.friction[1] - problem.friction[0]) / m.sqrt());
         }
-        if problem.has_gravity {
-            units.push(problem.stiffness);
+        if problem.plant.has_gravity {
+            units.push(problem.plant.stiffness);
         }
         scaled(&problem.decay(&self.point(x), &rate, &m), &units)
     }
@@ -215,7 +215,7 @@ impl Search {
 
     /// V at the start is at most `objective |e0|^2`.
     fn start(&self, x: &[f64]) -> DMatrix<f64> {
-        let form = self.problem.start(&self.point(x), &x[OBJECTIVE]);
+        let form = self.problem.plant.start(&self.point(x), &x[OBJECTIVE]);
         let units = [1.0, self.stiffness_unit()];
         scaled(&form, &units[..form.0.len()])
     }
@@ -246,10 +246,10 @@ impl Search {
     fn pinned(&self) -> Vec<Affine<'static>> {
         let Self { problem, .. } = self;
         let unused = [
-            problem.coriolis_relative.is_none().then_some(RELATIVE),
+            problem.plant.coriolis_relative.is_none().then_some(RELATIVE),
             (!problem.has_friction).then_some(FRICTION),
-            (!problem.has_gravity).then_some(GRAVITY),
-            (!problem.has_gravity).then_some(START),
+            (!problem.plant.has_gravity).then_some(GRAVITY),
+            (!problem.plant.has_gravity).then_some(START),
         ];
         unused.into_iter().flatten().map(|k| -> Affine<'static> { Box::new(move |x| scalar(-x[k])) }).collect()
     }
@@ -348,7 +348,8 @@ pub(crate) fn dyadics(values: impl IntoIterator<Item = f64>) -> Option<Vec<Numbe
 fn candidate(search: &Search, x: &[f64], rate: f64, shrink: f64) -> Option<RegionClaim> {
     let point = search.point(x);
     let rho = point.absolute + point.relative;
-    let theta = if search.problem.coriolis_relative.is_some() { (point.absolute / rho).clamp(0.0, 1.0) } else { 1.0 };
+    let theta =
+        if search.problem.plant.coriolis_relative.is_some() { (point.absolute / rho).clamp(0.0, 1.0) } else { 1.0 };
     let multiplier = |x: f64| Number::dyadic(x.max(0.0));
     let Limits { controller_torque_n_m, motor_limits_n_m, distance_rad } = search.limits.clone();
     Some(RegionClaim {
@@ -363,7 +364,7 @@ fn candidate(search: &Search, x: &[f64], rate: f64, shrink: f64) -> Option<Regio
             s: dyadics(point.energy.s)?,
             rho: Number::dyadic(rho)?,
             theta: Number::dyadic(theta)?,
-            friction_multiplier: multiplier(point.friction_multiplier)?,
+            friction_multiplier: multiplier(point.interval_multiplier)?,
             gravity_multiplier: multiplier(point.gravity_multiplier)?,
             start_multiplier: multiplier(point.start_multiplier)?,
         },

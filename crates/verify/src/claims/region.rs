@@ -27,16 +27,16 @@
 use std::fmt::Write as _;
 
 use num_rational::BigRational;
-use num_traits::{One, Signed, Zero};
+use num_traits::Signed;
 use serde::{Deserialize, Serialize};
 
-use super::energy::{Energy, Quantities, TRIANGLE};
+use super::energy::{Energy, Plant, Point, Quantities, State};
 use super::{ClaimKind, Figure, Inequality, LoopBox, Provable, all_hold, family_box};
-use crate::aic::{Controller, STATES};
+use crate::aic::STATES;
 use crate::document::{ConfigurationSet, Document};
 use crate::error::Flaw;
 use crate::form::{Field, Form, Row};
-use crate::number::{Number, positive, ratio, unit_interval};
+use crate::number::{Number, positive, ratio};
 use crate::quantity::{require, require_length, require_positive};
 use crate::statement::list;
 
@@ -186,7 +186,10 @@ pub fn region_inequalities(document: &Document, claim: &RegionClaim) -> Result<V
             record("distance", &problem.within(&point, m, State::Position, &inverse_square(most)));
         }
     }
-    all.push(Inequality::decide("start".to_owned(), &problem.start(&point, &inverse_square(&claim.radius_rad)).0));
+    all.push(Inequality::decide(
+        "start".to_owned(),
+        &problem.plant.start(&point, &inverse_square(&claim.radius_rad)).0,
+    ));
     Ok(all)
 }
 
@@ -197,15 +200,11 @@ impl RegionClaim {
     /// [`Flaw`] when the claim is about uncompensated gravity or its witness has the wrong length.
     pub fn start_weight(&self, document: &Document) -> Result<BigRational, Flaw> {
         require_compensation(document)?;
-        Ok(energy(&self.witness.p, &self.witness.b, &self.witness.s)?.start_weight())
+        Ok(Energy::of(&self.witness.p, &self.witness.b, &self.witness.s)?.start_weight())
     }
 
     /// The witness as numbers, once the claim's own are what the proof allows.
-    fn checked(
-        &self,
-        document: &Document,
-        problem: &RegionProblem<BigRational>,
-    ) -> Result<RegionPoint<BigRational>, Flaw> {
+    fn checked(&self, document: &Document, problem: &RegionProblem<BigRational>) -> Result<Point<BigRational>, Flaw> {
         require_positive("radius_rad", &self.radius_rad)?;
         require_positive("rate_per_s", &self.rate_per_s)?;
         for (name, number) in
@@ -232,8 +231,7 @@ impl RegionClaim {
         require_inside(document, &vec![self.distance_rad.clone(); joints])?;
         let witness = &self.witness;
         // A witness is only ever computed with: dyadics of any size will do.
-        require("p", &witness.p, positive(witness.p.value()), "a positive number")?;
-        let [absolute, relative] = cubic_shares(&witness.rho, &witness.theta, problem.coriolis_relative.is_some())?;
+        let [absolute, relative] = problem.plant.shares(&witness.rho, &witness.theta)?;
         for (name, multiplier) in [
             ("friction_multiplier", &witness.friction_multiplier),
             ("gravity_multiplier", &witness.gravity_multiplier),
@@ -241,12 +239,12 @@ impl RegionClaim {
         ] {
             require(name, multiplier, !multiplier.value().is_negative(), "a number of at least 0")?;
         }
-        Ok(RegionPoint {
-            energy: energy(&witness.p, &witness.b, &witness.s)?,
+        Ok(Point {
+            energy: Energy::of(&witness.p, &witness.b, &witness.s)?,
             rho_squared: witness.rho.value() * witness.rho.value(),
             absolute,
             relative,
-            friction_multiplier: witness.friction_multiplier.value().clone(),
+            interval_multiplier: witness.friction_multiplier.value().clone(),
             gravity_multiplier: witness.gravity_multiplier.value().clone(),
             start_multiplier: witness.start_multiplier.value().clone(),
         })
@@ -283,25 +281,6 @@ pub(crate) fn require_inside(document: &Document, distances: &[Option<Number>]) 
     Ok(())
 }
 
-/// The shares of `rho` that the two bounds of the cubic term take: without the relative one the absolute takes all.
-pub(crate) fn cubic_shares(rho: &Number, theta: &Number, relative: bool) -> Result<[BigRational; 2], Flaw> {
-    require("rho", rho, positive(rho.value()), "a positive number")?;
-    require("theta", theta, unit_interval(theta.value()), "a share in [0, 1]")?;
-    if !relative && !theta.value().is_one() {
-        return Err(Flaw::Missing { constant: "k_r" });
-    }
-    let absolute = theta.value() * rho.value();
-    Ok([absolute.clone(), rho.value() - absolute])
-}
-
-/// A witness's weights as numbers.
-pub(crate) fn energy(p: &Number, b: &[Number; STATES], s: &[Number]) -> Result<Energy<BigRational>, Flaw> {
-    let s: &[Number; TRIANGLE] =
-        s.try_into().map_err(|_| Flaw::Length { quantity: "s", found: s.len(), expected: TRIANGLE })?;
-    let value = |x: &Number| x.value().clone();
-    Ok(Energy { p: value(p), b: b.each_ref().map(value), s: s.each_ref().map(value) })
-}
-
 pub(crate) fn require_compensation(document: &Document) -> Result<(), Flaw> {
     let covered = document.family.gravity_compensation;
     if covered { Ok(()) } else { Err(Flaw::NotCovered { what: "moving goals without gravity compensation" }) }
@@ -310,59 +289,14 @@ pub(crate) fn require_compensation(document: &Document) -> Result<(), Flaw> {
 /// The loop as the proof sees it.
 #[derive(Clone, Debug)]
 pub struct RegionProblem<T> {
-    /// The controller of each joint.
-    pub controller: Controller<T>,
+    /// Controller and constants.
+    pub plant: Plant<T>,
     /// Ends of the inertia eigenvalues.
     pub inertia: [T; 2],
     /// Ends of the viscous friction.
     pub friction: [T; 2],
-    /// Largest gravity stiffness, zero when gravity is compensated.
-    pub stiffness: T,
-    /// `k_c`.
-    pub coriolis: T,
-    /// `k_r`, when it is known.
-    pub coriolis_relative: Option<T>,
     /// Whether the friction is an interval.
     pub has_friction: bool,
-    /// Whether gravity acts.
-    pub has_gravity: bool,
-}
-
-/// A point of the search: weights, bounds and multipliers.
-#[derive(Clone, Debug)]
-pub struct RegionPoint<T> {
-    /// `p, b, S`.
-    pub energy: Energy<T>,
-    /// `rho^2`.
-    pub rho_squared: T,
-    /// `rho theta`.
-    pub absolute: T,
-    /// `rho (1 - theta)`.
-    pub relative: T,
-    /// Multiplier of the friction interval.
-    pub friction_multiplier: T,
-    /// Multiplier of the gravity residue.
-    pub gravity_multiplier: T,
-    /// Multiplier of the torque at the start.
-    pub start_multiplier: T,
-}
-
-/// A state that the region bounds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum State {
-    /// `e`.
-    Position,
-    /// `u~`.
-    Torque,
-}
-
-impl State {
-    pub(crate) fn index(self) -> usize {
-        match self {
-            Self::Position => 0,
-            Self::Torque => STATES - 1,
-        }
-    }
 }
 
 /// The first coordinate of z.
@@ -375,32 +309,23 @@ impl RegionProblem<BigRational> {
     /// [`Flaw`] when it has another controller, or gains that differ between joints.
     pub fn new(document: &Document) -> Result<Self, Flaw> {
         let controller = document.gains.aic()?.shared(document.arm.joints)?.matrices();
-        let bounds = &document.constants.bounds;
-        let LoopBox { inertia, friction, stiffness: [_, stiffness] } = family_box(document);
+        let LoopBox { inertia, friction, .. } = family_box(document);
         let values = |interval: [Number; 2]| interval.map(|end| end.value().clone());
         Ok(Self {
-            controller,
+            plant: Plant::new(document, controller),
             has_friction: friction[1].value() > friction[0].value(),
-            has_gravity: !stiffness.value().is_zero(),
             inertia: values(inertia),
             friction: values(friction),
-            stiffness: stiffness.value().clone(),
-            coriolis: bounds.k_c_kg_m2.value().clone(),
-            coriolis_relative: bounds.k_r.as_ref().map(|k_r| k_r.value().clone()),
         })
     }
 
     /// The same over another field.
     pub fn map<T>(&self, convert: impl Fn(&BigRational) -> T) -> RegionProblem<T> {
         RegionProblem {
-            controller: self.controller.map(&convert),
+            plant: self.plant.map(&convert),
             inertia: self.inertia.each_ref().map(&convert),
             friction: self.friction.each_ref().map(&convert),
-            stiffness: convert(&self.stiffness),
-            coriolis: convert(&self.coriolis),
-            coriolis_relative: self.coriolis_relative.as_ref().map(&convert),
             has_friction: self.has_friction,
-            has_gravity: self.has_gravity,
         }
     }
 }
@@ -413,74 +338,30 @@ impl<T: Field> RegionProblem<T> {
         Quantities { order, pi: dq.times(m), dq, z }
     }
 
-    /// A lower bound of V over (dq, z, ..): its potential is at least `-p k_g |e|^2`.
-    fn least_value(&self, point: &RegionPoint<T>, at: &Quantities<T>) -> Form<T> {
-        let mut form = point.energy.value(at);
-        form.add(&-(point.energy.p.clone() * &self.stiffness), &at.z[0], &at.z[0]);
-        form
-    }
-
     /// Over (dq, z, 1): `[[P(m) - p k_g e e', beta], [beta', rho^2]]`, `beta = (0, b)`.
-    pub fn containment(&self, point: &RegionPoint<T>, m: &T) -> Form<T> {
-        let order = Z + STATES + 1;
-        let at = Self::quantities(order, m);
-        let mut form = self.least_value(point, &at);
-        let one = Row::coordinate(order, order - 1, T::one());
-        form.add(&T::fraction(2, 1), &point.energy.y(&at), &one);
-        form.add(&point.rho_squared, &one, &one);
-        form
+    pub fn containment(&self, point: &Point<T>, m: &T) -> Form<T> {
+        self.plant.containment(point, &Self::quantities(Z + STATES + 1, m))
     }
 
     /// Over (dq, z): `P(m) - p k_g e e' - inverse_square x x'` for a state x.
-    pub fn within(&self, point: &RegionPoint<T>, m: &T, state: State, inverse_square: &T) -> Form<T> {
-        let at = Self::quantities(Z + STATES, m);
-        let mut form = self.least_value(point, &at);
-        let state = &at.z[state.index()];
-        form.add(&-inverse_square.clone(), state, state);
-        form
+    pub fn within(&self, point: &Point<T>, m: &T, state: State, inverse_square: &T) -> Form<T> {
+        self.plant.within(point, &Self::quantities(Z + STATES, m), state, inverse_square)
     }
 
     /// Over (dq, z, f, w), the last two as far as friction is an interval and gravity acts: minus the form of
     /// `dV/dt + 2 rate V` with the multiplier terms.
-    pub fn decay(&self, point: &RegionPoint<T>, rate: &T, m: &T) -> Form<T> {
-        let order = Z + STATES + usize::from(self.has_friction) + usize::from(self.has_gravity);
+    pub fn decay(&self, point: &Point<T>, rate: &T, m: &T) -> Form<T> {
+        let has_gravity = self.plant.has_gravity;
+        let order = Z + STATES + usize::from(self.has_friction) + usize::from(has_gravity);
         let at = Self::quantities(order, m);
         let unit = |index| Row::coordinate(order, index, T::one());
-        let absent = || Row::zero(order);
-        let f = if self.has_friction { unit(Z + STATES) } else { absent() };
-        let w = if self.has_gravity { unit(order - 1) } else { absent() };
+        let f = if self.has_friction { unit(Z + STATES) } else { Row::zero(order) };
+        let w = if has_gravity { unit(order - 1) } else { Row::zero(order) };
         let [d0, d1] = &self.friction;
-        let minus = -T::one();
-        let powered = at.z[STATES - 1].plus(&-d0.clone(), &at.dq).plus(&minus, &f);
-        let mut form = point.energy.change(&at, &self.controller, &powered.plus(&minus, &w), &powered);
-        // The cubic term is at most 2 rho (theta k_c + (1 - theta) k_r m) |dq|^2.
-        let two = T::fraction(2, 1);
-        form.add(&(two.clone() * &point.absolute * &self.coriolis), &at.dq, &at.dq);
-        if let Some(k_r) = &self.coriolis_relative {
-            form.add(&(two.clone() * &point.relative * k_r), &at.dq, &at.pi);
-        }
-        // V's potential is at most p k_g |e|^2.
-        let twice_rate = two * rate;
-        form.add_form(&twice_rate, &point.energy.value(&at));
-        form.add(&(twice_rate * &point.energy.p * &self.stiffness), &at.z[0], &at.z[0]);
-        // f'((d1 - d0) dq - f) >= 0 and k_g^2 |e|^2 - |w|^2 >= 0.
-        let slack = at.dq.times(&(d1.clone() - d0)).plus(&minus, &f);
-        form.add(&point.friction_multiplier, &f, &slack);
-        let squared = self.stiffness.clone() * &self.stiffness * &point.gravity_multiplier;
-        form.add(&squared, &at.z[0], &at.z[0]);
-        form.add(&-point.gravity_multiplier.clone(), &w, &w);
+        let mut form = self.plant.change(point, &at, [d0, rate], [&f, &w]);
+        // f'((d1 - d0) dq - f) >= 0.
+        let slack = at.dq.times(&(d1.clone() - d0)).plus(&-T::one(), &f);
+        form.add(&point.interval_multiplier, &f, &slack);
         form.negated()
-    }
-
-    /// Over (e0, u~0), the latter where gravity acts: `e = m = e0`, the rest zero, `|u~0| <= k_g |e0|`; positive definite when
-    /// `V < inverse_square |e0|^2`.
-    pub fn start(&self, point: &RegionPoint<T>, inverse_square: &T) -> Form<T> {
-        let bound = inverse_square.clone() - &(point.energy.p.clone() * &self.stiffness);
-        if !self.has_gravity {
-            return Form(vec![vec![bound - &point.energy.start_weight()]]);
-        }
-        let multiplier = &point.start_multiplier;
-        let bound = bound - &(self.stiffness.clone() * &self.stiffness * multiplier);
-        point.energy.start_excess(bound, multiplier.clone())
     }
 }
