@@ -1,5 +1,4 @@
 //! Contract: a limited goal never moves faster than allowed, keeps to the straight line, arrives to the bit, and no input moves it astray.
-#![expect(clippy::unwrap_used, reason = "test helpers")]
 
 use certune_control::{GoalRateLimiter, ParamError};
 use certune_linsys::Joints;
