@@ -1,6 +1,7 @@
 //! The kinds of claims. Each file holds what one kind states, its words, and its proof.
 
 mod exponential;
+mod moving_goal;
 mod not_proved;
 mod refused;
 mod region;
@@ -14,6 +15,7 @@ use crate::error::Flaw;
 use crate::number::Number;
 
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
+pub use moving_goal::{GoalList, ListedGoal, MovingGoalClaim, moving_goal_inequalities};
 pub use not_proved::{NotProvedClaim, Reason};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
 pub use region::{RegionClaim, RegionWitness, region_inequalities};
@@ -26,6 +28,8 @@ pub enum Claim {
     Exponential(ExponentialClaim),
     /// The nonlinear loop decays from every start in a ball.
     Region(Box<RegionClaim>),
+    /// The state stays in the region of an earlier entry while the goal moves.
+    MovingGoal(Box<MovingGoalClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -37,6 +41,7 @@ impl Claim {
         match self {
             Self::Exponential(claim) => claim,
             Self::Region(claim) => claim.as_ref(),
+            Self::MovingGoal(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -52,7 +57,7 @@ impl Claim {
         match self {
             Self::Refused(_) => Verdict::Refused,
             Self::NotProved(_) => Verdict::NotProved,
-            Self::Exponential(_) | Self::Region(_) => Verdict::Holds,
+            Self::Exponential(_) | Self::Region(_) | Self::MovingGoal(_) => Verdict::Holds,
         }
     }
 
