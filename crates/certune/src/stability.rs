@@ -73,7 +73,7 @@ pub fn family_of(plant_box: &PlantBox) -> Result<FamilyValues, StabilityError> {
 }
 
 /// How hard a certificate is searched.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Effort {
     /// The search for proofs.
     pub proofs: Options,

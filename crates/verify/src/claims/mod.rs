@@ -3,6 +3,7 @@
 mod energy;
 mod exponential;
 mod joint_region;
+mod moving_goal;
 mod not_proved;
 mod refused;
 mod region;
@@ -20,6 +21,7 @@ pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
 pub use joint_region::{
     CoveredSteps, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights, joint_region_inequalities,
 };
+pub use moving_goal::{GoalList, ListedGoal, MovingGoalClaim, moving_goal_inequalities};
 pub use not_proved::{NotProvedClaim, Reason};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
 pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
@@ -34,6 +36,8 @@ pub enum Claim {
     Region(Box<RegionClaim>),
     /// The same with gains, frictions and limits of each joint.
     JointRegion(Box<JointRegionClaim>),
+    /// The state stays in the region of an earlier entry while the goal moves.
+    MovingGoal(Box<MovingGoalClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -46,6 +50,7 @@ impl Claim {
             Self::Exponential(claim) => claim,
             Self::Region(claim) => claim.as_ref(),
             Self::JointRegion(claim) => claim.as_ref(),
+            Self::MovingGoal(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -61,7 +66,7 @@ impl Claim {
         match self {
             Self::Refused(_) => Verdict::Refused,
             Self::NotProved(_) => Verdict::NotProved,
-            Self::Exponential(_) | Self::Region(_) | Self::JointRegion(_) => Verdict::Holds,
+            _ => Verdict::Holds,
         }
     }
 
