@@ -9,6 +9,7 @@
 //! | `problem` | gains, family and constants of an arm as a document without claims |
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
+//! | `sampled_region` | the same of the sampled nonlinear loop |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
@@ -18,6 +19,7 @@ mod exponential;
 mod lmi;
 mod problem;
 mod region;
+mod sampled_region;
 
 pub use exponential::{UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
@@ -25,6 +27,7 @@ pub use problem::{
     AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, ProblemError, SampledConstantValues, arm_ranges,
 };
 pub use region::{RegionOptions, region};
+pub use sampled_region::{SampledRegionOptions, sampled_region};
 
 use certune_verify::{
     Attained, Certificate, Claim, ClaimKind, Document, NotProvedClaim, Number, Reason, Rejection, seal, verify,
@@ -49,6 +52,8 @@ pub enum CertifyError {
 pub struct Options {
     /// The region of the nonlinear loop.
     pub region: RegionOptions,
+    /// The region of the sampled nonlinear loop.
+    pub sampled_region: SampledRegionOptions,
 }
 
 /// Makes the claims about a problem, in the order asked for, and has them checked.
@@ -69,6 +74,7 @@ pub fn certify(
         let claim = match kind {
             ClaimKind::Exponential => exponential(problem, attain),
             ClaimKind::Region => region(problem, &options.region),
+            ClaimKind::SampledRegion => sampled_region(problem, &options.sampled_region),
             other => not_proved(*other, Reason::FamilyNotCovered, None),
         };
         document.claims.push(claim.into());

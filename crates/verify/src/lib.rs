@@ -37,8 +37,10 @@ mod statement;
 pub use aic::AicGains;
 pub use check::{Certificate, Checked, seal, verify};
 pub use claims::{
-    Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, Figure, Inequality, LoopBox, LoopFamily, NotProvedClaim,
-    Reason, RefusedClaim, RegionClaim, RegionWitness, Verdict, family_box, region_inequalities,
+    Attained, BoxPoint, Claim, ClaimKind, Compensation, Coordinates, Corner, ExponentialClaim, Figure, Inequality,
+    LoopBox, LoopFamily, NotProvedClaim, Reach, Reason, RefusedClaim, RegionClaim, RegionWitness, SampledLoop,
+    SampledRegionClaim, SampledRegionWitness, SampledUnknowns, Sampling, Verdict, family_box, region_inequalities,
+    sampled_loop, sampled_region_inequalities,
 };
 pub use document::{Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade};
 pub use error::{Flaw, Rejection, VerifyError};

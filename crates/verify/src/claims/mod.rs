@@ -4,6 +4,8 @@ mod exponential;
 mod not_proved;
 mod refused;
 mod region;
+mod sampled_motion;
+mod sampled_region;
 
 use num_rational::BigRational;
 use serde::{Deserialize, Serialize};
@@ -17,6 +19,10 @@ pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
 pub use not_proved::{NotProvedClaim, Reason};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
 pub use region::{RegionClaim, RegionWitness, region_inequalities};
+pub use sampled_motion::{Coordinates, Corner, Reach, SampledLoop, SampledUnknowns};
+pub use sampled_region::{
+    Compensation, SampledRegionClaim, SampledRegionWitness, Sampling, sampled_loop, sampled_region_inequalities,
+};
 
 /// What an entry of a document claims.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,6 +32,8 @@ pub enum Claim {
     Exponential(ExponentialClaim),
     /// The nonlinear loop decays from every start in a ball.
     Region(Box<RegionClaim>),
+    /// The sampled nonlinear loop decays from every start in a ball.
+    SampledRegion(Box<SampledRegionClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -37,6 +45,7 @@ impl Claim {
         match self {
             Self::Exponential(claim) => claim,
             Self::Region(claim) => claim.as_ref(),
+            Self::SampledRegion(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -52,7 +61,7 @@ impl Claim {
         match self {
             Self::Refused(_) => Verdict::Refused,
             Self::NotProved(_) => Verdict::NotProved,
-            Self::Exponential(_) | Self::Region(_) => Verdict::Holds,
+            Self::Exponential(_) | Self::Region(_) | Self::SampledRegion(_) => Verdict::Holds,
         }
     }
 

@@ -13,7 +13,7 @@
 //! The bounds are those of `proofs/claims/sampled-region.md`.
 
 use num_rational::BigRational;
-use num_traits::{One, Signed, ToPrimitive};
+use num_traits::{Signed, ToPrimitive};
 
 use super::sampled_region::Sampling;
 use crate::aic::{ControllerMatrices, STATES};
@@ -42,6 +42,11 @@ impl Corner<BigRational> {
         }));
         corners
     }
+
+    /// The same point in floating point, for a search.
+    pub fn to_f64(&self) -> Corner<f64> {
+        Corner { inertia: float(&self.inertia), inverse: float(&self.inverse) }
+    }
 }
 
 /// A bound `kinetic |dq|_M^2 + torque h^2 |tau|_M^-1^2`.
@@ -54,7 +59,7 @@ pub struct Bound<T> {
 impl Bound<BigRational> {
     /// Of `(x |dq|_M + y h |tau|_M^-1)^2 <= (1 + t) x^2 .. + (1 + 1/t) y^2 ..`, rounded up.
     fn of_square(x: &BigRational, y: &BigRational, t: &BigRational) -> Self {
-        let one = BigRational::one();
+        let one = ratio(1, 1);
         Self { kinetic: rounded_up(&((&one + t) * x * x)), torque: rounded_up(&((&one + t.recip()) * y * y)) }
     }
 
@@ -129,14 +134,16 @@ impl SampledLoop<BigRational> {
         k_m: &BigRational,
         stiffness: BigRational,
     ) -> Result<Self, Flaw> {
-        let (one, two, three) = (BigRational::one(), ratio(2, 1), ratio(3, 1));
+        let (one, two, three) = (ratio(1, 1), ratio(2, 1), ratio(3, 1));
         let step = sampling.step_s.value();
         let m_lo = bounds.m_lo_kg_m2.value();
         let delta = step * &largest_friction / m_lo;
         let gamma = step * step * &stiffness / (&two * m_lo);
         let least = &one - &delta - &two * &gamma;
         if least < ratio(1, 4) {
-            return Err(Flaw::NotCovered { what: "a period in which friction or gravity can change the speed by more than 3/4" });
+            return Err(Flaw::NotCovered {
+                what: "a period in which friction or gravity can change the speed by more than 3/4",
+            });
         }
         let (chi, chi_behind) = ((&one - &two * &gamma).recip(), least.recip());
         let a = &speed * &chi;
@@ -208,7 +215,7 @@ impl SampledLoop<BigRational> {
 
 /// Which coordinates an inequality has, beside `dq, y, f_-` and the controller's states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scope {
+pub enum Reach {
     /// None: what is known at the sample.
     Sample,
     /// `vb` and f.
@@ -237,8 +244,8 @@ pub struct Coordinates {
 }
 
 impl<T: Field> SampledLoop<T> {
-    /// The coordinates of the inequalities of a scope.
-    pub fn coordinates(&self, scope: Scope) -> Coordinates {
+    /// The coordinates of the inequalities that reach so far.
+    pub fn coordinates(&self, reach: Reach) -> Coordinates {
         let mut next = 1;
         let mut take = |present: bool| {
             present.then(|| {
@@ -246,12 +253,12 @@ impl<T: Field> SampledLoop<T> {
                 next - 1
             })
         };
-        let ahead = scope != Scope::Sample;
+        let ahead = reach != Reach::Sample;
         let mean = take(ahead);
         take(true);
         let friction = take(ahead && self.has_friction);
         let friction_behind = take(self.has_friction);
-        let held = take(scope == Scope::Force && self.is_held);
+        let held = take(reach == Reach::Force && self.is_held);
         let error = next;
         Coordinates {
             order: error + STATES + self.delay,
@@ -264,6 +271,12 @@ impl<T: Field> SampledLoop<T> {
         }
     }
 
+    /// The torques held in the period that starts and in the one that ended.
+    pub fn held_torques(&self, reach: Reach) -> [Row<T>; 2] {
+        let motion = self.motion(reach);
+        [motion.torque, motion.torque_behind]
+    }
+
     /// Samples of delay.
     pub fn delay(&self) -> usize {
         self.delay
@@ -274,13 +287,33 @@ impl<T: Field> SampledLoop<T> {
         [&self.least_friction, &self.friction_span]
     }
 
+    /// The gravity stiffness that a held compensation leaves, N m/rad; 0 when the compensation is continuous.
+    pub fn stiffness(&self) -> &T {
+        &self.stiffness
+    }
+
+    /// Whether the controller's torque is to keep to a limit.
+    pub fn is_limited(&self) -> bool {
+        self.limit.is_some()
+    }
+
+    /// Whether the Coriolis term has a bound relative to M.
+    pub fn has_relative_bound(&self) -> bool {
+        self.coriolis_relative.is_some()
+    }
+
+    /// Square of `alpha` in the bound on the mean velocity.
+    pub fn remainder(&self) -> &T {
+        &self.ahead.kinetic
+    }
+
     /// The controller's period, s.
     pub fn step(&self) -> &T {
         &self.step
     }
 
-    fn motion(&self, scope: Scope) -> Motion<T> {
-        let at = self.coordinates(scope);
+    fn motion(&self, reach: Reach) -> Motion<T> {
+        let at = self.coordinates(reach);
         let unit = |index: usize| Row::coordinate(at.order, index, T::one());
         let optional = |index: Option<usize>| index.map_or_else(|| Row::zero(at.order), unit);
         let (dq, mean, mean_behind) = (unit(0), optional(at.mean), unit(at.mean_behind));
@@ -296,8 +329,7 @@ impl<T: Field> SampledLoop<T> {
             new[i] = states[i].plus(h, &rate(i, states));
         }
         let command = states[STATES - 1].plus(h, &rate(STATES - 1, &new));
-        let torques: Vec<Row<T>> =
-            [&command, &states[STATES - 1]].into_iter().chain(history).cloned().collect();
+        let torques: Vec<Row<T>> = [&command, &states[STATES - 1]].into_iter().chain(history).cloned().collect();
         let (torque, torque_behind) = (torques[self.delay].clone(), torques[self.delay + 1].clone());
         let force = |torque: &Row<T>, mean: &Row<T>, friction: &Row<T>| {
             torque.plus(&-self.least_friction.clone(), mean).plus(&-T::one(), friction)
@@ -382,7 +414,7 @@ impl<T: Field> SampledLoop<T> {
 
     /// `V - (k_m h / speed)^2 (|dq|_M + h |tau|_M^-1)^2` with the multipliers of the last period.
     pub fn growth(&self, x: &SampledUnknowns<T>, at: &Corner<T>) -> Form<T> {
-        let motion = self.motion(Scope::Sample);
+        let motion = self.motion(Reach::Sample);
         let mut form = self.value(&motion, x, at);
         self.add_bound(&mut form, &-T::one(), &self.speed, &motion.dq, &motion.torque, at);
         self.add_behind(&mut form, [&-x.growth[0].clone(), &-x.growth[1].clone()], &motion, at);
@@ -392,7 +424,7 @@ impl<T: Field> SampledLoop<T> {
     /// `V - |u+|^2 / limit^2` with the multipliers of the last period; `None` without a limit.
     pub fn torque(&self, x: &SampledUnknowns<T>, at: &Corner<T>) -> Option<Form<T>> {
         let limit = self.limit.as_ref()?;
-        let motion = self.motion(Scope::Sample);
+        let motion = self.motion(Reach::Sample);
         let mut form = self.value(&motion, x, at);
         form.add(&-(T::one() / &(limit.clone() * limit)), &motion.command, &motion.command);
         self.add_behind(&mut form, [&-x.torque[0].clone(), &-x.torque[1].clone()], &motion, at);
@@ -401,7 +433,7 @@ impl<T: Field> SampledLoop<T> {
 
     /// `[[V with multipliers, Y+], [Y+', rho^2]]`.
     pub fn containment(&self, x: &SampledUnknowns<T>, at: &Corner<T>) -> Form<T> {
-        let motion = self.motion(Scope::Period);
+        let motion = self.motion(Reach::Period);
         let mut form = self.value(&motion, x, at);
         let [ahead, behind, friction, friction_behind] = x.containment.each_ref().map(|l| -l.clone());
         self.add_ahead(&mut form, [&ahead, &friction], &motion, at);
@@ -418,7 +450,7 @@ impl<T: Field> SampledLoop<T> {
 
     /// Minus the bound on `(V+ - V)/h + 2 rate V`, with the multipliers.
     pub fn decay(&self, x: &SampledUnknowns<T>, at: &Corner<T>) -> Form<T> {
-        let motion = self.motion(Scope::Force);
+        let motion = self.motion(Reach::Force);
         let (h, two) = (&self.step, T::fraction(2, 1));
         let per_step = T::one() / h;
         let mut form = Form::zero(motion.order);

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 use super::sampled_motion::{Corner, SampledLoop, SampledUnknowns};
 use super::{ClaimKind, Figure, Inequality, Provable, all_hold};
-use crate::algebra::zeros;
+use crate::algebra::{Matrix, zeros};
 use crate::document::{ConfigurationSet, Document};
 use crate::error::Flaw;
 use crate::number::{Number, positive, unit_interval};
@@ -176,10 +176,7 @@ fn states(delay: usize) -> Result<usize, Flaw> {
 ///
 /// # Errors
 /// [`Flaw`] when the numbers are outside what the proof allows.
-pub fn sampled_region_inequalities(
-    document: &Document,
-    claim: &SampledRegionClaim,
-) -> Result<Vec<Inequality>, Flaw> {
+pub fn sampled_region_inequalities(document: &Document, claim: &SampledRegionClaim) -> Result<Vec<Inequality>, Flaw> {
     let SampledRegionClaim { radius_rad, sampling, witness } = claim;
     require_positive("radius_rad", radius_rad)?;
     let motion = sampled_loop(document, sampling, &witness.rho, &witness.speed)?;
@@ -189,7 +186,7 @@ pub fn sampled_region_inequalities(
     }
     let mut all = Vec::new();
     for (index, corner) in corners(document, witness)?.iter().enumerate() {
-        let mut record = |what: &str, matrix| {
+        let mut record = |what: &str, matrix: &Matrix| {
             all.push(Inequality::decide(format!("{what} at corner {} of the inertia interval", index + 1), matrix));
         };
         record("growth", &motion.growth(&unknowns, corner).0);
@@ -259,7 +256,12 @@ fn corners(document: &Document, witness: &SampledRegionWitness) -> Result<Vec<Co
     }
     let mut points = vec![bounds.m_lo_kg_m2.value()];
     for point in &witness.inertia_kg_m2 {
-        require("inertia_kg_m2", point, points[points.len() - 1] < point.value(), "points that rise from m_lo to m_hi")?;
+        require(
+            "inertia_kg_m2",
+            point,
+            points[points.len() - 1] < point.value(),
+            "points that rise from m_lo to m_hi",
+        )?;
         points.push(point.value());
     }
     let largest = &bounds.m_hi_kg_m2;
