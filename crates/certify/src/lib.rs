@@ -10,6 +10,7 @@
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
 //! | `moving_goal` | the fastest goal that a region allows |
+//! | `sampled_region` | the same of the sampled nonlinear loop |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
@@ -20,6 +21,7 @@ mod lmi;
 mod moving_goal;
 mod problem;
 mod region;
+mod sampled_region;
 
 pub use exponential::{UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
@@ -28,6 +30,7 @@ pub use problem::{
     AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, ProblemError, SampledConstantValues, arm_ranges,
 };
 pub use region::{RegionOptions, region};
+pub use sampled_region::{SampledRegionOptions, sampled_region};
 
 use certune_verify::{
     Attained, Certificate, Claim, ClaimKind, Document, NotProvedClaim, Number, Reason, Rejection, seal, verify,
@@ -54,6 +57,8 @@ pub struct Options {
     pub region: RegionOptions,
     /// The goal that moves.
     pub moving_goal: MovingGoalOptions,
+    /// The region of the sampled nonlinear loop.
+    pub sampled_region: SampledRegionOptions,
 }
 
 /// Makes the claims about a problem, in the order asked for, and has them checked.
@@ -76,6 +81,11 @@ pub fn certify(
             ClaimKind::Region => vec![region(problem, &options.region)],
             ClaimKind::MovingGoal => moving_goal(problem, &document, &options.moving_goal),
             other => vec![not_proved(*other, Reason::FamilyNotCovered, None)],
+        let claim = match kind {
+            ClaimKind::Exponential => exponential(problem, attain),
+            ClaimKind::Region => region(problem, &options.region),
+            ClaimKind::SampledRegion => sampled_region(problem, &options.sampled_region),
+            other => not_proved(*other, Reason::FamilyNotCovered, None),
         };
         document.claims.extend(made.into_iter().map(Into::into));
     }

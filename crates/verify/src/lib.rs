@@ -41,6 +41,7 @@ mod statement;
 pub use aic::{AicGains, Controller, STATES};
 pub use check::{Certificate, Checked, seal, verify};
 pub use claims::*;
+pub use claims::*;
 pub use document::{Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade};
 pub use error::{Flaw, Rejection, VerifyError};
 pub use form::{Field, Form, Row};

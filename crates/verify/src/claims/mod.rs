@@ -7,6 +7,8 @@ mod moving_goal;
 mod not_proved;
 mod refused;
 mod region;
+mod sampled_motion;
+mod sampled_region;
 
 use num_rational::BigRational;
 use serde::{Deserialize, Serialize};
@@ -25,6 +27,11 @@ pub use moving_goal::{GoalList, ListedGoal, MovingGoalClaim, moving_goal_inequal
 pub use not_proved::{NotProvedClaim, Reason};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
 pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
+pub use region::{RegionClaim, RegionWitness, region_inequalities};
+pub use sampled_motion::{Coordinates, Corner, Reach, SampledLoop, SampledUnknowns};
+pub use sampled_region::{
+    Compensation, SampledRegionClaim, SampledRegionWitness, Sampling, sampled_loop, sampled_region_inequalities,
+};
 
 /// What an entry of a document claims.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,6 +45,8 @@ pub enum Claim {
     JointRegion(Box<JointRegionClaim>),
     /// The state stays in the region of an earlier entry while the goal moves.
     MovingGoal(Box<MovingGoalClaim>),
+    /// The sampled nonlinear loop decays from every start in a ball.
+    SampledRegion(Box<SampledRegionClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -51,6 +60,7 @@ impl Claim {
             Self::Region(claim) => claim.as_ref(),
             Self::JointRegion(claim) => claim.as_ref(),
             Self::MovingGoal(claim) => claim.as_ref(),
+            Self::SampledRegion(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -66,6 +76,7 @@ impl Claim {
         match self {
             Self::Refused(_) => Verdict::Refused,
             Self::NotProved(_) => Verdict::NotProved,
+            _ => Verdict::Holds,
             _ => Verdict::Holds,
         }
     }
