@@ -123,8 +123,7 @@ pub fn enclosure<const N: usize>(
             coriolis: a.coriolis.max(b.coriolis),
         });
     // There is at least one piece.
-    let Piece { mut mass, coriolis } =
-        joined.unwrap_or(Piece { mass: JointMatrix::zeros(), coriolis: f64::INFINITY });
+    let Piece { mut mass, coriolis } = joined.unwrap_or(Piece { mass: JointMatrix::zeros(), coriolis: f64::INFINITY });
     let [rotor_lower, rotor_upper] = arms.rotor_inertia_kg_m2();
     for joint in 0..N {
         mass[(joint, joint)] += Interval::new(rotor_lower[joint], rotor_upper[joint]);

@@ -53,9 +53,9 @@ fn check(arms: &ArmBox<7>, found: &Enclosure<7>, index: u32) -> [f64; 2] {
     let groups = arms.groups();
     let mut point: Vec<f64> =
         (0..7).map(|j| found.lower_rad[j] + share(j) * (found.upper_rad[j] - found.lower_rad[j])).collect();
-    point.extend(groups.iter().enumerate().map(|(g, group)| {
-        group.scale[0] + share(7 + g) * (group.scale[1] - group.scale[0])
-    }));
+    point.extend(
+        groups.iter().enumerate().map(|(g, group)| group.scale[0] + share(7 + g) * (group.scale[1] - group.scale[0])),
+    );
     point.push(share(19));
     let member = arms.member(&point).unwrap();
     let mass = mass_matrix(&member.model, &member.q);
@@ -89,8 +89,13 @@ fn no_member_leaves_the_enclosure() {
     for (arms, halvings) in [(nominal(), 0), (family(), 0), (nominal(), 1), (family(), 1)] {
         for (name, goal) in &GOALS {
             let found = around(&arms, goal, HALF_WIDTH_RAD, halvings);
-            let used = (0..3000).map(|k| check(&arms, &found, k)).fold([0.0_f64; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
-            println!("{name}: k_C {}, used {used:?} R {:?}", found.coriolis_kg_m2, found.radius_kg_m2.iter().flatten().fold(0.0_f64,|a,b| a.max(*b)));
+            let used =
+                (0..3000).map(|k| check(&arms, &found, k)).fold([0.0_f64; 2], |a, b| [a[0].max(b[0]), a[1].max(b[1])]);
+            println!(
+                "{name}: k_C {}, used {used:?} R {:?}",
+                found.coriolis_kg_m2,
+                found.radius_kg_m2.iter().flatten().fold(0.0_f64, |a, b| a.max(*b))
+            );
             // Not vacuous: some member comes near both bounds.
             assert!(used[0] > 0.5 && used[1] > 0.5, "{used:?}");
         }

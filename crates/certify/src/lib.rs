@@ -9,16 +9,19 @@
 //! | `problem` | gains, family and constants of an arm as a document without claims |
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
+//! | `adaptive` | convergence, the frozen loop and the sampled velocity loop of the adaptive controller |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
 #![forbid(unsafe_code)]
 
+mod adaptive;
 mod exponential;
 mod lmi;
 mod problem;
 mod region;
 
+pub use adaptive::{adaptive_convergence, adaptive_sampled, pi_exponential};
 pub use exponential::{UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
 pub use problem::{

@@ -131,6 +131,7 @@ impl SampledConstantValues {
                     .as_deref()
                     .map(|values| list("gravity_torque_n_m", values, 1.0))
                     .transpose()?,
+                inertia: None,
             },
             evidence: Evidence::Sampled {
                 margin: number("margin", self.margin)?,

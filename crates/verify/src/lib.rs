@@ -12,6 +12,7 @@
 //! | `algebra` | characteristic polynomial, Hurwitz determinants, Sturm sequences, LDL' |
 //! | `form` | quadratic forms assembled from linear ones |
 //! | `aic`, `gains` | the controllers' gains, and the AIC's matrices |
+//! | `mrac` | what the proofs about the adaptive controller need of its gains |
 //! | `claims` | one file for each kind of claim: what it states, its words, its proof |
 //! | `document` | the file |
 //! | `record` | proved constants of an arm, referred to by their hash |
@@ -29,18 +30,23 @@ mod document;
 mod error;
 mod form;
 mod gains;
+mod mrac;
 mod number;
 mod quantity;
 mod record;
 mod statement;
 
 pub use aic::AicGains;
-pub use check::{Certificate, Checked, seal, verify};
+pub use check::{Certificate, Checked, checked_alone, seal, verify};
 pub use claims::{
-    Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, Figure, Inequality, LoopBox, LoopFamily, NotProvedClaim,
-    Reason, RefusedClaim, RegionClaim, RegionWitness, Verdict, family_box, region_inequalities,
+    AdaptiveConvergenceClaim, AdaptiveLoop, AdaptiveRefusedClaim, AdaptiveSampledClaim, AdaptiveSampledRefusedClaim,
+    AdaptiveWitness, Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, Figure, Inequality, LoopBox, LoopFamily,
+    NotProvedClaim, PiExponentialClaim, PiRefusedClaim, Reason, RefusedClaim, RegionClaim, RegionWitness, Verdict,
+    adaptive_inequalities, family_box, pi_inequalities, region_inequalities,
 };
-pub use document::{Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade};
+pub use document::{
+    Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade, InertiaEnclosure,
+};
 pub use error::{Flaw, Rejection, VerifyError};
 pub use form::{Field, Form, Row};
 pub use gains::{Gains, MracGains, MracLaw};

@@ -134,16 +134,13 @@ impl Mul for Interval {
     type Output = Self;
 
     fn mul(self, other: Self) -> Self {
-        let products = [
-            self.lower * other.lower,
-            self.lower * other.upper,
-            self.upper * other.lower,
-            self.upper * other.upper,
-        ];
+        let products =
+            [self.lower * other.lower, self.lower * other.upper, self.upper * other.lower, self.upper * other.upper];
         if products.iter().any(|x| x.is_nan()) {
             return WHOLE;
         }
-        let [lower, upper] = products.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, u], &x| [l.min(x), u.max(x)]);
+        let [lower, upper] =
+            products.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[l, u], &x| [l.min(x), u.max(x)]);
         Self::outward(lower, upper)
     }
 }

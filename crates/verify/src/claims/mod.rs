@@ -1,7 +1,10 @@
 //! The kinds of claims. Each file holds what one kind states, its words, and its proof.
 
+mod adaptive_convergence;
+mod adaptive_sampled;
 mod exponential;
 mod not_proved;
+mod pi_exponential;
 mod refused;
 mod region;
 
@@ -13,8 +16,13 @@ use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
 
+pub use adaptive_convergence::{
+    AdaptiveConvergenceClaim, AdaptiveLoop, AdaptiveRefusedClaim, AdaptiveWitness, adaptive_inequalities,
+};
+pub use adaptive_sampled::{AdaptiveSampledClaim, AdaptiveSampledRefusedClaim};
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
 pub use not_proved::{NotProvedClaim, Reason};
+pub use pi_exponential::{PiExponentialClaim, PiRefusedClaim, pi_inequalities};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
 pub use region::{RegionClaim, RegionWitness, region_inequalities};
 
@@ -26,6 +34,18 @@ pub enum Claim {
     Exponential(ExponentialClaim),
     /// The nonlinear loop decays from every start in a ball.
     Region(Box<RegionClaim>),
+    /// The adaptive loop's error converges.
+    AdaptiveConvergence(Box<AdaptiveConvergenceClaim>),
+    /// No function of the form that `adaptive-convergence` needs falls.
+    AdaptiveRefused(Box<AdaptiveRefusedClaim>),
+    /// The adaptive loop decays when its adaptation is frozen.
+    PiExponential(PiExponentialClaim),
+    /// It does not, for one joint and inertia.
+    PiRefused(PiRefusedClaim),
+    /// The adaptive loop's velocity loop survives sampling and delay.
+    AdaptiveSampled(AdaptiveSampledClaim),
+    /// It does not, because of one joint.
+    AdaptiveSampledRefused(AdaptiveSampledRefusedClaim),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -37,6 +57,12 @@ impl Claim {
         match self {
             Self::Exponential(claim) => claim,
             Self::Region(claim) => claim.as_ref(),
+            Self::AdaptiveConvergence(claim) => claim.as_ref(),
+            Self::AdaptiveRefused(claim) => claim.as_ref(),
+            Self::PiExponential(claim) => claim,
+            Self::PiRefused(claim) => claim,
+            Self::AdaptiveSampled(claim) => claim,
+            Self::AdaptiveSampledRefused(claim) => claim,
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -50,9 +76,15 @@ impl Claim {
     /// What a checked entry of this kind amounts to.
     pub fn verdict(&self) -> Verdict {
         match self {
-            Self::Refused(_) => Verdict::Refused,
+            Self::Refused(_) | Self::AdaptiveRefused(_) | Self::PiRefused(_) | Self::AdaptiveSampledRefused(_) => {
+                Verdict::Refused
+            }
             Self::NotProved(_) => Verdict::NotProved,
-            Self::Exponential(_) | Self::Region(_) => Verdict::Holds,
+            Self::Exponential(_)
+            | Self::Region(_)
+            | Self::AdaptiveConvergence(_)
+            | Self::PiExponential(_)
+            | Self::AdaptiveSampled(_) => Verdict::Holds,
         }
     }
 
@@ -86,6 +118,8 @@ pub enum ClaimKind {
     AdaptiveConvergence,
     /// The adaptive loop decays when its adaptation is frozen.
     PiExponential,
+    /// The adaptive loop's velocity loop survives sampling and delay.
+    AdaptiveSampled,
 }
 
 impl ClaimKind {
@@ -102,6 +136,7 @@ impl ClaimKind {
             Self::Lyapunov => "lyapunov",
             Self::AdaptiveConvergence => "adaptive-convergence",
             Self::PiExponential => "pi-exponential",
+            Self::AdaptiveSampled => "adaptive-sampled",
         }
     }
 }
