@@ -25,7 +25,8 @@ pub use adaptive::{adaptive_convergence, adaptive_sampled, pi_exponential};
 pub use exponential::{UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
 pub use problem::{
-    AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, ProblemError, SampledConstantValues, arm_ranges,
+    AicGainValues, ArmValues, ConstantValues, EnclosureValues, FamilyValues, MracGainValues, Problem, ProblemError,
+    SampledConstantValues, arm_ranges,
 };
 pub use region::{RegionOptions, region};
 
