@@ -36,13 +36,17 @@ mod quantity;
 mod record;
 mod statement;
 
-pub use aic::AicGains;
+pub use aic::{AicGains, Controller, STATES};
 pub use check::{Certificate, Checked, checked_alone, seal, verify};
 pub use claims::{
     AdaptiveConvergenceClaim, AdaptiveLoop, AdaptiveRefusedClaim, AdaptiveSampledClaim, AdaptiveSampledRefusedClaim,
-    AdaptiveWitness, Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, Figure, Inequality, LoopBox, LoopFamily,
-    NotProvedClaim, PiExponentialClaim, PiRefusedClaim, Reason, RefusedClaim, RegionClaim, RegionWitness, Verdict,
-    adaptive_inequalities, family_box, pi_inequalities, region_inequalities,
+    AdaptiveWitness, PiExponentialClaim, PiRefusedClaim, adaptive_inequalities, pi_inequalities,
+};
+pub use claims::{
+    Attained, BoxPoint, Claim, ClaimKind, CoveredSteps, Energy, ExponentialClaim, Figure, Inequality, JointProblem,
+    JointRegionClaim, JointRegionWitness, JointWeights, LoopBox, LoopFamily, NotProvedClaim, Plant, Point, Reason,
+    RefusedClaim, RegionClaim, RegionProblem, RegionWitness, State, TRIANGLE, Verdict, family_box,
+    joint_region_inequalities, region_inequalities, triangle,
 };
 pub use document::{
     Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade, InertiaEnclosure,

@@ -2,7 +2,9 @@
 
 mod adaptive_convergence;
 mod adaptive_sampled;
+mod energy;
 mod exponential;
+mod joint_region;
 mod not_proved;
 mod pi_exponential;
 mod refused;
@@ -20,11 +22,15 @@ pub use adaptive_convergence::{
     AdaptiveConvergenceClaim, AdaptiveLoop, AdaptiveRefusedClaim, AdaptiveWitness, adaptive_inequalities,
 };
 pub use adaptive_sampled::{AdaptiveSampledClaim, AdaptiveSampledRefusedClaim};
+pub use energy::{Energy, Plant, Point, State, TRIANGLE, triangle};
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
+pub use joint_region::{
+    CoveredSteps, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights, joint_region_inequalities,
+};
 pub use not_proved::{NotProvedClaim, Reason};
 pub use pi_exponential::{PiExponentialClaim, PiRefusedClaim, pi_inequalities};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
-pub use region::{RegionClaim, RegionWitness, region_inequalities};
+pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
 
 /// What an entry of a document claims.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,6 +52,8 @@ pub enum Claim {
     AdaptiveSampled(AdaptiveSampledClaim),
     /// It does not, because of one joint.
     AdaptiveSampledRefused(AdaptiveSampledRefusedClaim),
+    /// The same with gains, frictions and limits of each joint.
+    JointRegion(Box<JointRegionClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -63,6 +71,7 @@ impl Claim {
             Self::PiRefused(claim) => claim,
             Self::AdaptiveSampled(claim) => claim,
             Self::AdaptiveSampledRefused(claim) => claim,
+            Self::JointRegion(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -82,6 +91,7 @@ impl Claim {
             Self::NotProved(_) => Verdict::NotProved,
             Self::Exponential(_)
             | Self::Region(_)
+            | Self::JointRegion(_)
             | Self::AdaptiveConvergence(_)
             | Self::PiExponential(_)
             | Self::AdaptiveSampled(_) => Verdict::Holds,
