@@ -11,11 +11,13 @@
 //! | `region` | largest certified ball of starts of the nonlinear loop |
 //! | `moving_goal` | the fastest goal that a region allows |
 //! | `sampled_region` | the same of the sampled nonlinear loop |
+//! | `adaptive` | convergence, the frozen loop and the sampled velocity loop of the adaptive controller |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
 #![forbid(unsafe_code)]
 
+mod adaptive;
 mod exponential;
 mod lmi;
 mod moving_goal;
@@ -23,11 +25,13 @@ mod problem;
 mod region;
 mod sampled_region;
 
+pub use adaptive::{adaptive_convergence, adaptive_sampled, pi_exponential};
 pub use exponential::{UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
 pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal};
 pub use problem::{
-    AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, ProblemError, SampledConstantValues, arm_ranges,
+    AicGainValues, ArmValues, ConstantValues, EnclosureValues, FamilyValues, MracGainValues, Problem, ProblemError,
+    SampledConstantValues, arm_ranges,
 };
 pub use region::{RegionOptions, region};
 pub use sampled_region::{SampledRegionOptions, sampled_region};
