@@ -84,12 +84,8 @@ pub fn certify(
             ClaimKind::Exponential => vec![exponential(problem, attain)],
             ClaimKind::Region => vec![region(problem, &options.region)],
             ClaimKind::MovingGoal => moving_goal(problem, &document, &options.moving_goal),
+            ClaimKind::SampledRegion => vec![sampled_region(problem, &options.sampled_region)],
             other => vec![not_proved(*other, Reason::FamilyNotCovered, None)],
-        let claim = match kind {
-            ClaimKind::Exponential => exponential(problem, attain),
-            ClaimKind::Region => region(problem, &options.region),
-            ClaimKind::SampledRegion => sampled_region(problem, &options.sampled_region),
-            other => not_proved(*other, Reason::FamilyNotCovered, None),
         };
         document.claims.extend(made.into_iter().map(Into::into));
     }
