@@ -9,18 +9,23 @@
 //! | `problem` | gains, family and constants of an arm as a document without claims |
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
+//! | `disturbance` | least bound on the error under noise and pushes |
+//! | `digits` | figures rounded to the safe side |
 //! | `moving_goal` | the fastest goal that a region allows |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
 #![forbid(unsafe_code)]
 
+mod digits;
+mod disturbance;
 mod exponential;
 mod lmi;
 mod moving_goal;
 mod problem;
 mod region;
 
+pub use disturbance::{DisturbanceOptions, disturbance};
 pub use exponential::{UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
 pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal};
@@ -54,6 +59,8 @@ pub struct Options {
     pub region: RegionOptions,
     /// The goal that moves.
     pub moving_goal: MovingGoalOptions,
+    /// The error under noise and pushes.
+    pub disturbance: DisturbanceOptions,
 }
 
 /// Makes the claims about a problem, in the order asked for, and has them checked.
@@ -75,6 +82,7 @@ pub fn certify(
             ClaimKind::Exponential => vec![exponential(problem, attain)],
             ClaimKind::Region => vec![region(problem, &options.region)],
             ClaimKind::MovingGoal => moving_goal(problem, &document, &options.moving_goal),
+            ClaimKind::Disturbance => vec![disturbance(problem, &options.disturbance)],
             other => vec![not_proved(*other, Reason::FamilyNotCovered, None)],
         };
         document.claims.extend(made.into_iter().map(Into::into));

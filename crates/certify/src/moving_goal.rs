@@ -9,6 +9,7 @@ use certune_verify::{
     moving_goal_inequalities,
 };
 
+use crate::digits::{above, down, readable};
 use crate::not_proved;
 use crate::problem::Problem;
 use crate::region::{RegionOptions, region};
@@ -99,11 +100,6 @@ pub fn moving_goal(problem: &Problem, document: &Document, options: &MovingGoalO
     refused(Reason::CandidateFailed)
 }
 
-/// A rate of three digits, so that it can be read.
-fn readable(rate: f64) -> f64 {
-    format!("{rate:.2e}").parse().unwrap_or(rate)
-}
-
 /// A coarse geometric grid, then halvings of its spacing around the best point. `None` when no rate gives a speed.
 fn best_rate(speed: impl Fn(f64) -> f64, options: &MovingGoalOptions) -> Option<f64> {
     let [first, last] = options.rates_per_s.map(f64::ln);
@@ -190,25 +186,6 @@ const FASTEST_RAD_PER_S: f64 = 100.0;
 
 fn distance(from: &[f64], to: &[f64]) -> f64 {
     from.iter().zip(to).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt()
-}
-
-/// Four digits, rounded down.
-fn down(x: f64) -> Option<Number> {
-    digits(x, f64::floor)
-}
-
-/// Four digits, rounded up.
-fn above(x: f64) -> Option<Number> {
-    digits(x, f64::ceil)
-}
-
-fn digits(x: f64, round: fn(f64) -> f64) -> Option<Number> {
-    if !(x > 0.0 && x.is_finite()) {
-        return None;
-    }
-    let decade = x.log10().floor() as i32 - 3;
-    let text = format!("{:.0}e{decade}", round(x / 10_f64.powi(decade)));
-    Number::decimal(text.parse().ok()?)
 }
 
 fn candidate(document: &Document, ramp: &Ramp, options: &MovingGoalOptions, shrink: f64) -> Option<MovingGoalClaim> {

@@ -41,8 +41,9 @@ mod statement;
 pub use aic::AicGains;
 pub use check::{Certificate, Checked, seal, verify};
 pub use claims::{
-    Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, Figure, GoalList, Inequality, ListedGoal, LoopBox,
-    LoopFamily, MovingGoalClaim, NotProvedClaim, Reason, RefusedClaim, RegionClaim, RegionWitness, Verdict, family_box,
+    Attained, BoxPoint, Claim, ClaimKind, DisturbanceClaim, DisturbanceUnknowns, DisturbanceWitness, DisturbedArm,
+    ExponentialClaim, Figure, GoalList, Inequality, ListedGoal, LoopBox, LoopFamily, MovingGoalClaim, NotProvedClaim,
+    Reason, RefusedClaim, RegionClaim, RegionWitness, Verdict, disturbance_inequalities, family_box,
     moving_goal_inequalities, region_inequalities,
 };
 pub use document::{Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade};

@@ -1,5 +1,6 @@
 //! The kinds of claims. Each file holds what one kind states, its words, and its proof.
 
+mod disturbance;
 mod exponential;
 mod moving_goal;
 mod not_proved;
@@ -14,6 +15,9 @@ use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
 
+pub use disturbance::{
+    DisturbanceClaim, DisturbanceUnknowns, DisturbanceWitness, DisturbedArm, disturbance_inequalities,
+};
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
 pub use moving_goal::{GoalList, ListedGoal, MovingGoalClaim, moving_goal_inequalities};
 pub use not_proved::{NotProvedClaim, Reason};
@@ -30,6 +34,8 @@ pub enum Claim {
     Region(Box<RegionClaim>),
     /// The state stays in the region of an earlier entry while the goal moves.
     MovingGoal(Box<MovingGoalClaim>),
+    /// The error stays bounded under bounded noise and pushes.
+    Disturbance(Box<DisturbanceClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -42,6 +48,7 @@ impl Claim {
             Self::Exponential(claim) => claim,
             Self::Region(claim) => claim.as_ref(),
             Self::MovingGoal(claim) => claim.as_ref(),
+            Self::Disturbance(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -57,7 +64,7 @@ impl Claim {
         match self {
             Self::Refused(_) => Verdict::Refused,
             Self::NotProved(_) => Verdict::NotProved,
-            Self::Exponential(_) | Self::Region(_) | Self::MovingGoal(_) => Verdict::Holds,
+            Self::Exponential(_) | Self::Region(_) | Self::MovingGoal(_) | Self::Disturbance(_) => Verdict::Holds,
         }
     }
 
