@@ -6,15 +6,17 @@
 //! disturbances by their bounds).
 
 use certune_verify::{
-    Claim, ClaimKind, DisturbanceClaim, DisturbanceUnknowns, DisturbanceWitness, DisturbedArm, Document, Form, Number,
-    Reason, disturbance_inequalities,
+    Claim, ClaimKind, DisturbanceClaim, DisturbanceWitness, DisturbedArm, Document, Energy, Number, Point, Reason,
+    STATES, State, TRIANGLE, disturbance_inequalities, triangle,
 };
 use nalgebra::DMatrix;
+use num_traits::ToPrimitive;
 
 use crate::digits::{above, readable};
 use crate::lmi::{Affine, Program};
 use crate::not_proved;
 use crate::problem::Problem;
+use crate::region::{scaled, strict};
 
 /// What disturbs the loop, and where it starts. All norms are 2-norms over the joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,11 +46,10 @@ impl Default for DisturbanceOptions {
     }
 }
 
-const STATES: usize = 5;
 const P: usize = 0;
 const B: usize = 1;
 const S: usize = B + STATES;
-const THETA: usize = S + 15;
+const THETA: usize = S + TRIANGLE;
 const FRICTION: usize = THETA + 1;
 const SHARES: usize = FRICTION + 1;
 const START: usize = SHARES + 3;
@@ -103,7 +104,6 @@ type Place = [f64; 3];
 
 struct Search {
     arm: DisturbedArm<f64>,
-    inertia: [f64; 2],
     torque_unit: f64,
     /// The size of the set, rad: coordinates of the state are in units of it.
     length: f64,
@@ -126,7 +126,7 @@ impl Search {
             witness: DisturbanceWitness {
                 p: zero(),
                 b: core::array::from_fn(|_| zero()),
-                s: vec![zero(); 15],
+                s: vec![zero(); TRIANGLE],
                 rho: zero(),
                 theta: zero(),
                 friction_multiplier: zero(),
@@ -134,15 +134,14 @@ impl Search {
                 start_shares: core::array::from_fn(|_| zero()),
             },
         };
-        let arm = DisturbedArm::new(document, &blank).ok()?.to_f64();
-        let bounds = &document.constants.bounds;
+        let arm = DisturbedArm::new(document, &blank).ok()?.map(|x| x.to_f64().unwrap_or(f64::NAN));
+        let controller = &arm.region.plant.controller;
         // The controller's largest weight on the torque sets its size.
-        let torque_unit = 5.0 * arm.a[4][0].abs().max(arm.b[4].abs()).sqrt();
+        let torque_unit = 5.0 * controller.a[4][0].abs().max(controller.b[4].abs()).sqrt();
         let acts = arm.disturbances.iter().flatten().chain(arm.start.iter().flatten()).count() > 0;
         let sensible = arm.start.iter().chain(&arm.disturbances).flatten().all(|x| *x > 0.0);
         (acts && sensible && torque_unit > 0.0 && torque_unit.is_finite()).then_some(Self {
             arm,
-            inertia: [bounds.m_lo_kg_m2.to_f64(), bounds.m_hi_kg_m2.to_f64()],
             torque_unit,
             length: if options.radius_rad > 0.0 { options.radius_rad } else { FIRST_LENGTH_RAD },
             blank,
@@ -158,27 +157,31 @@ impl Search {
         self.arm.start[0].is_some() || self.arm.start[3].is_some()
     }
 
-    fn has_friction(&self) -> bool {
-        self.arm.friction[1] > self.arm.friction[0]
-    }
-
     /// The torque's share of a scaled coordinate.
     fn scale(&self, k: usize) -> f64 {
         if k == STATES - 1 { self.torque_unit.recip() } else { 1.0 }
     }
 
-    fn unknowns(&self, x: &[f64]) -> DisturbanceUnknowns<f64> {
+    fn point(&self, x: &[f64], rho: f64) -> Point<f64> {
         let unit = self.length.powi(-2);
-        DisturbanceUnknowns {
-            p: x[P] * unit,
-            b: core::array::from_fn(|k| x[B + k] * self.scale(k) * unit),
-            s: core::array::from_fn(|i| {
-                core::array::from_fn(|j| x[S + triangle(i, j)] * self.scale(i) * self.scale(j) * unit)
-            }),
-            theta: if self.arm.coriolis_relative.is_some() { x[THETA] } else { 1.0 },
-            friction_multiplier: x[FRICTION] * unit,
-            disturbance_shares: core::array::from_fn(|k| x[SHARES + k]),
+        let mut s = [0.0; TRIANGLE];
+        for (i, j) in (0..STATES).flat_map(|i| (i..STATES).map(move |j| (i, j))) {
+            s[triangle(i, j)] = x[S + triangle(i, j)] * self.scale(i) * self.scale(j) * unit;
         }
+        let theta = self.theta(x);
+        Point {
+            energy: Energy { p: x[P] * unit, b: core::array::from_fn(|k| x[B + k] * self.scale(k) * unit), s },
+            rho_squared: rho * rho,
+            absolute: rho * theta,
+            relative: rho * (1.0 - theta),
+            interval_multiplier: x[FRICTION] * unit,
+            gravity_multiplier: 0.0,
+            start_multiplier: 0.0,
+        }
+    }
+
+    fn theta(&self, x: &[f64]) -> f64 {
+        if self.arm.region.plant.coriolis_relative.is_some() { x[THETA].clamp(0.0, 1.0) } else { 1.0 }
     }
 
     /// Scales of (dq, z).
@@ -190,56 +193,55 @@ impl Search {
     fn containment(&self, x: &[f64], m: f64, rho: f64) -> DMatrix<f64> {
         let mut scales = self.state_scales(m);
         scales.push(self.length);
-        scaled(&self.unknowns(x).containment(&m, &rho), &scales)
+        scaled(&self.arm.region.containment(&self.point(x, rho), &m), &scales)
     }
 
     fn excursion(&self, x: &[f64], m: f64) -> DMatrix<f64> {
-        scaled(&self.unknowns(x).excursion(&m, &(x[CLOSENESS] * self.length.powi(-2))), &self.state_scales(m))
+        let closeness = x[CLOSENESS] * self.length.powi(-2);
+        scaled(&self.arm.region.within(&self.point(x, 1.0), &m, State::Position, &closeness), &self.state_scales(m))
     }
 
     fn decay(&self, x: &[f64], m: f64, [rate, rho, _]: Place) -> DMatrix<f64> {
         let mut scales = self.state_scales(m);
-        if self.has_friction() {
-            scales.push((self.arm.friction[1] - self.arm.friction[0]) / m.sqrt() * self.length);
+        if self.arm.region.has_friction {
+            let [least, largest] = self.arm.region.friction;
+            scales.push((largest - least) / m.sqrt() * self.length);
         }
         scales.extend(self.arm.disturbances.iter().flatten());
-        scaled(&self.arm.decay(&self.unknowns(x), &m, &rho, &rate), &scales)
+        let shares = core::array::from_fn(|k| x[SHARES + k]);
+        scaled(&self.arm.decay(&self.point(x, rho), &shares, &rate, &m), &scales)
     }
 
     fn start(&self, x: &[f64]) -> DMatrix<f64> {
         let shares = [0, 1, 2, 3].map(|k| &x[START + k]);
         let scales: Vec<f64> = self.arm.start.iter().flatten().copied().collect();
-        scaled(&self.arm.start(&self.unknowns(x), shares), &scales)
+        scaled(&self.arm.start(&self.point(x, 1.0), shares), &scales)
     }
 
     /// The point with the least excursion.
     fn solve(&self, place: Place, strictness: f64) -> Option<Vec<f64>> {
         let [_, rho, level] = place;
-        let strict = |matrix: DMatrix<f64>| {
-            let order = matrix.nrows();
-            matrix - DMatrix::identity(order, order) * strictness
-        };
         let at_most = |most: f64, x: &[f64], first: usize, count: usize| {
             DMatrix::from_element(1, 1, most - x[first..first + count].iter().sum::<f64>())
         };
         let mut blocks: Vec<Affine<'_>> = Vec::new();
-        for m in self.inertia {
-            blocks.push(Box::new(move |x| strict(self.containment(x, m, rho))));
-            blocks.push(Box::new(move |x| strict(self.decay(x, m, place))));
-            blocks.push(Box::new(move |x| strict(self.excursion(x, m))));
+        for m in self.arm.region.inertia {
+            blocks.push(Box::new(move |x| strict(self.containment(x, m, rho), strictness)));
+            blocks.push(Box::new(move |x| strict(self.decay(x, m, place), strictness)));
+            blocks.push(Box::new(move |x| strict(self.excursion(x, m), strictness)));
         }
         blocks.push(Box::new(move |x| at_most(1.0, x, THETA, 1)));
         // A little below, so that rounding keeps the sums.
         blocks.push(Box::new(move |x| at_most(level * (1.0 - 1e-9), x, SHARES, 3)));
         blocks.push(Box::new(move |x| at_most(1.0 - 1e-9, x, START, 4)));
         if self.arm.start.iter().any(Option::is_some) {
-            blocks.push(Box::new(move |x| strict(self.start(x))));
+            blocks.push(Box::new(move |x| strict(self.start(x), strictness)));
         }
         let nonnegative = [P, THETA, FRICTION].into_iter().chain(SHARES..VARIABLES).collect();
         // A multiplier that appears nowhere would leave the program without a unique answer: pin it at zero.
         let mut unused = Vec::new();
-        unused.extend((!self.has_friction()).then_some(FRICTION));
-        unused.extend(self.arm.coriolis_relative.is_none().then_some(THETA));
+        unused.extend((!self.arm.region.has_friction).then_some(FRICTION));
+        unused.extend(self.arm.region.plant.coriolis_relative.is_none().then_some(THETA));
         unused.extend((0..3).filter(|&k| self.arm.disturbances[k].is_none()).map(|k| SHARES + k));
         unused.extend((0..4).filter(|&k| self.arm.start[k].is_none()).map(|k| START + k));
         for k in unused {
@@ -310,15 +312,13 @@ impl Search {
 
     /// The solver's point as exact numbers, with bounds a little larger than the solver's.
     fn candidate(&self, x: &[f64], [rate, rho, _]: Place, shrink: f64) -> Option<DisturbanceClaim> {
-        let v = self.unknowns(x);
+        let point = self.point(x, rho);
         let dyadics = |values: &[f64]| values.iter().map(|&x| Number::dyadic(x)).collect::<Option<Vec<_>>>();
         let share = |used: bool, value: f64| if used { Number::dyadic(value.max(0.0)) } else { Some(Number::zero()) };
         let disturbance_shares =
             (0..3).map(|k| share(self.arm.disturbances[k].is_some(), x[SHARES + k])).collect::<Option<Vec<_>>>()?;
         let start_shares =
             (0..4).map(|k| share(self.arm.start[k].is_some(), x[START + k])).collect::<Option<Vec<_>>>()?;
-        let triangle: Vec<f64> =
-            (0..STATES).flat_map(|i| (i..STATES).map(move |j| (i, j))).map(|(i, j)| v.s[i][j]).collect();
         let excursion = above((1.0 + shrink) * self.excursion_rad(x))?;
         let level: f64 = disturbance_shares.iter().map(Number::to_f64).sum();
         let ultimate =
@@ -328,27 +328,16 @@ impl Search {
             excursion_rad: excursion,
             ultimate_rad: ultimate,
             witness: DisturbanceWitness {
-                p: Number::dyadic(v.p)?,
-                b: dyadics(&v.b)?.try_into().ok()?,
-                s: dyadics(&triangle)?,
+                p: Number::dyadic(point.energy.p)?,
+                b: dyadics(&point.energy.b)?.try_into().ok()?,
+                s: dyadics(&point.energy.s)?,
                 rho: Number::dyadic(rho)?,
-                theta: Number::dyadic(v.theta.clamp(0.0, 1.0))?,
-                friction_multiplier: Number::dyadic(v.friction_multiplier.max(0.0))?,
+                theta: Number::dyadic(self.theta(x))?,
+                friction_multiplier: Number::dyadic(point.interval_multiplier.max(0.0))?,
                 disturbance_shares: disturbance_shares.try_into().ok()?,
                 start_shares: start_shares.try_into().ok()?,
             },
             ..self.blank.clone()
         })
     }
-}
-
-/// Index of S's entry in its upper triangle, row by row.
-fn triangle(i: usize, j: usize) -> usize {
-    let (i, j) = (i.min(j), i.max(j));
-    i * STATES - i * (i + 1) / 2 + j
-}
-
-/// The form in coordinates that are `scales` times as large.
-fn scaled(form: &Form<f64>, scales: &[f64]) -> DMatrix<f64> {
-    DMatrix::from_fn(form.0.len(), form.0.len(), |i, j| form.0[i][j] * scales[i] * scales[j])
 }

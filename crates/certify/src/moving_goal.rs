@@ -5,8 +5,8 @@
 //! a short move is nearly a jump, which only the radius limits.
 
 use certune_verify::{
-    Claim, ClaimKind, Document, GoalList, ListedGoal, MovingGoalClaim, Number, Reason, RegionClaim,
-    moving_goal_inequalities,
+    Claim, ClaimKind, Document, GoalList, ListedGoal, MovingGoalClaim, Number, Reason, RegionClaim, STATES,
+    moving_goal_inequalities, triangle,
 };
 
 use crate::digits::{above, down, readable};
@@ -71,7 +71,7 @@ pub fn moving_goal(problem: &Problem, document: &Document, options: &MovingGoalO
     if !options.list.as_ref().is_none_or(lists_fit) || !(options.dwell_s > 0.0) {
         return refused(Reason::OutOfRange);
     }
-    let at_rate = |rate: f64| match region(problem, &RegionOptions { rate_per_s: rate, ..options.region }) {
+    let at_rate = |rate: f64| match region(problem, &RegionOptions { rate_per_s: rate, ..options.region.clone() }) {
         Claim::Region(claim) => Ok(claim),
         other => Err(other),
     };
@@ -228,20 +228,14 @@ fn largest_error(document: &Document, claim: &RegionClaim) -> Option<f64> {
     let bounds = &document.constants.bounds;
     let mut worst: f64 = 0.0;
     for m in [&bounds.m_lo_kg_m2, &bounds.m_hi_kg_m2] {
-        let m = m.to_f64();
-        // dq scaled by 1/sqrt m; the rest is left as it is.
-        let mut form = nalgebra::DMatrix::zeros(6, 6);
-        form[(0, 0)] = witness.p.to_f64();
-        for (k, b) in witness.b.iter().enumerate() {
-            form[(0, 1 + k)] = m.sqrt() * b.to_f64();
-            form[(1 + k, 0)] = form[(0, 1 + k)];
-        }
-        let places = (0..5).flat_map(|i| (i..5).map(move |j| (i, j)));
-        for ((i, j), s) in places.zip(&witness.s) {
-            form[(1 + i, 1 + j)] = s.to_f64();
-            form[(1 + j, 1 + i)] = s.to_f64();
-        }
-        worst = worst.max(form.try_inverse()?[(1, 1)]);
+        let root = m.to_f64().sqrt();
+        // dq scaled by 1/sqrt m.
+        let entry = |i: usize, j: usize| match (i.min(j), i.max(j)) {
+            (0, 0) => witness.p.to_f64(),
+            (0, j) => root * witness.b[j - 1].to_f64(),
+            (i, j) => witness.s[triangle(i - 1, j - 1)].to_f64(),
+        };
+        worst = worst.max(nalgebra::DMatrix::from_fn(1 + STATES, 1 + STATES, entry).try_inverse()?[(1, 1)]);
     }
     Some(worst.sqrt() * (1.0 + 1e-9))
 }

@@ -38,13 +38,14 @@ mod quantity;
 mod record;
 mod statement;
 
-pub use aic::AicGains;
+pub use aic::{AicGains, Controller, STATES};
 pub use check::{Certificate, Checked, seal, verify};
 pub use claims::{
-    Attained, BoxPoint, Claim, ClaimKind, DisturbanceClaim, DisturbanceUnknowns, DisturbanceWitness, DisturbedArm,
-    ExponentialClaim, Figure, GoalList, Inequality, ListedGoal, LoopBox, LoopFamily, MovingGoalClaim, NotProvedClaim,
-    Reason, RefusedClaim, RegionClaim, RegionWitness, Verdict, disturbance_inequalities, family_box,
-    moving_goal_inequalities, region_inequalities,
+    Attained, BoxPoint, Claim, ClaimKind, CoveredSteps, DisturbanceClaim, DisturbanceWitness, DisturbedArm, Energy,
+    ExponentialClaim, Figure, GoalList, Inequality, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights,
+    ListedGoal, LoopBox, LoopFamily, MovingGoalClaim, NotProvedClaim, Plant, Point, Reason, RefusedClaim, RegionClaim,
+    RegionProblem, RegionWitness, State, TRIANGLE, Verdict, disturbance_inequalities, family_box,
+    joint_region_inequalities, moving_goal_inequalities, region_inequalities, triangle,
 };
 pub use document::{Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade};
 pub use error::{Flaw, Rejection, VerifyError};

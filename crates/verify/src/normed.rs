@@ -6,9 +6,8 @@
 
 use num_rational::BigRational;
 
-use crate::algebra::Matrix;
-use crate::claims::{Claim, Inequality, RegionClaim};
-use crate::document::{ConfigurationSet, Document};
+use crate::claims::{Claim, Inequality};
+use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
 
@@ -21,6 +20,8 @@ pub(crate) struct Norm {
     pub(crate) rate: BigRational,
     /// The sampling step h, s, where V is a function of the state at sample instants; none in continuous time.
     pub(crate) period: Option<BigRational>,
+    /// Each joint stays this close to its goal, rad, when the claim says so.
+    pub(crate) kept: Option<Vec<Number>>,
 }
 
 /// A claim about the set `{V <= 1}` that holds for a constant goal and stays meaningful when the goal changes.
@@ -44,55 +45,7 @@ pub(crate) fn region_before(document: &Document, position: usize, index: usize) 
     let earlier = document.claims.get(..position).unwrap_or_default();
     match index.checked_sub(1).and_then(|index| earlier.get(index)).map(|entry| &entry.claim) {
         Some(Claim::Region(claim)) => Ok(claim.as_ref()),
+        Some(Claim::JointRegion(claim)) => Ok(claim.as_ref()),
         _ => Err(none()),
     }
-}
-
-/// A region's V is a norm for every goal only where gravity is compensated and no set of configurations has to be kept.
-pub(crate) fn require_norm(document: &Document) -> Result<(), Flaw> {
-    if !document.family.gravity_compensation {
-        return Err(Flaw::NotCovered { what: "an arm whose gravity is not compensated" });
-    }
-    match document.constants.over {
-        ConfigurationSet::AllAngles => Ok(()),
-        ConfigurationSet::Box { .. } => Err(Flaw::NotCovered { what: "constants that hold in a box only" }),
-    }
-}
-
-impl Normed for RegionClaim {
-    fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
-        require_norm(document)?;
-        let s = self.witness.s.as_slice();
-        let [s_00, s_01, _, _, _, s_11, ..] = s else {
-            return Err(Flaw::Length { quantity: "s", found: s.len(), expected: 15 });
-        };
-        let weight = s_00.value() + s_01.value() + s_01.value() + s_11.value();
-        let rate = self.rate_per_s.value().clone();
-        Ok(Norm { shift_weights: vec![weight; document.arm.joints], rate, period: None })
-    }
-
-    fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
-        let bounds = &document.constants.bounds;
-        let end = |name: &str, m: &Number| -> Result<Inequality, Flaw> {
-            let mut form = shared_form(&self.witness.p, &self.witness.b, &self.witness.s, m)?;
-            form[1][1] -= (most * most).recip();
-            Ok(Inequality::decide(format!("distance at the {name} inertia"), &form))
-        };
-        Ok(vec![end("least", &bounds.m_lo_kg_m2)?, end("largest", &bounds.m_hi_kg_m2)?])
-    }
-}
-
-/// `P(m) = [[p m, m b'], [m b, S]]` over `(dq, z)`, S given by its upper triangle.
-fn shared_form(p: &Number, b: &[Number; 5], triangle: &[Number], m: &Number) -> Result<Matrix, Flaw> {
-    crate::quantity::require_length("s", triangle.len(), 15)?;
-    let mut form = crate::algebra::zeros(6);
-    form[0][0] = p.value() * m.value();
-    for (k, entry) in b.iter().enumerate() {
-        crate::algebra::add_symmetric(&mut form, 0, 1 + k, &(entry.value() * m.value()));
-    }
-    let places = (0..5).flat_map(|i| (i..5).map(move |j| (i, j)));
-    for ((i, j), entry) in places.zip(triangle) {
-        crate::algebra::add_symmetric(&mut form, 1 + i, 1 + j, entry.value());
-    }
-    Ok(form)
 }

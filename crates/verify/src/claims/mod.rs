@@ -1,7 +1,9 @@
 //! The kinds of claims. Each file holds what one kind states, its words, and its proof.
 
 mod disturbance;
+mod energy;
 mod exponential;
+mod joint_region;
 mod moving_goal;
 mod not_proved;
 mod refused;
@@ -15,14 +17,16 @@ use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
 
-pub use disturbance::{
-    DisturbanceClaim, DisturbanceUnknowns, DisturbanceWitness, DisturbedArm, disturbance_inequalities,
-};
+pub use disturbance::{DisturbanceClaim, DisturbanceWitness, DisturbedArm, disturbance_inequalities};
+pub use energy::{Energy, Plant, Point, State, TRIANGLE, triangle};
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
+pub use joint_region::{
+    CoveredSteps, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights, joint_region_inequalities,
+};
 pub use moving_goal::{GoalList, ListedGoal, MovingGoalClaim, moving_goal_inequalities};
 pub use not_proved::{NotProvedClaim, Reason};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
-pub use region::{RegionClaim, RegionWitness, region_inequalities};
+pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
 
 /// What an entry of a document claims.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,6 +36,8 @@ pub enum Claim {
     Exponential(ExponentialClaim),
     /// The nonlinear loop decays from every start in a ball.
     Region(Box<RegionClaim>),
+    /// The same with gains, frictions and limits of each joint.
+    JointRegion(Box<JointRegionClaim>),
     /// The state stays in the region of an earlier entry while the goal moves.
     MovingGoal(Box<MovingGoalClaim>),
     /// The error stays bounded under bounded noise and pushes.
@@ -47,6 +53,7 @@ impl Claim {
         match self {
             Self::Exponential(claim) => claim,
             Self::Region(claim) => claim.as_ref(),
+            Self::JointRegion(claim) => claim.as_ref(),
             Self::MovingGoal(claim) => claim.as_ref(),
             Self::Disturbance(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
@@ -64,7 +71,11 @@ impl Claim {
         match self {
             Self::Refused(_) => Verdict::Refused,
             Self::NotProved(_) => Verdict::NotProved,
-            Self::Exponential(_) | Self::Region(_) | Self::MovingGoal(_) | Self::Disturbance(_) => Verdict::Holds,
+            Self::Exponential(_)
+            | Self::Region(_)
+            | Self::JointRegion(_)
+            | Self::MovingGoal(_)
+            | Self::Disturbance(_) => Verdict::Holds,
         }
     }
 
