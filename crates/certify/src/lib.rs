@@ -9,6 +9,8 @@
 //! | `problem` | gains, family and constants of an arm as a document without claims |
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
+//! | `disturbance` | least bound on the error under noise and pushes |
+//! | `digits` | figures rounded to the safe side |
 //! | `moving_goal` | the fastest goal that a region allows |
 //! | `sampled_region` | the same of the sampled nonlinear loop |
 //! | `adaptive` | convergence, the frozen loop and the sampled velocity loop of the adaptive controller |
@@ -18,6 +20,8 @@
 #![forbid(unsafe_code)]
 
 mod adaptive;
+mod digits;
+mod disturbance;
 mod exponential;
 mod lmi;
 mod moving_goal;
@@ -26,6 +30,7 @@ mod region;
 mod sampled_region;
 
 pub use adaptive::{adaptive_convergence, adaptive_sampled, pi_exponential};
+pub use disturbance::{DisturbanceOptions, disturbance};
 pub use exponential::{UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
 pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal};
@@ -63,6 +68,8 @@ pub struct Options {
     pub moving_goal: MovingGoalOptions,
     /// The region of the sampled nonlinear loop.
     pub sampled_region: SampledRegionOptions,
+    /// The error under noise and pushes.
+    pub disturbance: DisturbanceOptions,
 }
 
 /// Makes the claims about a problem, in the order asked for, and has them checked.
@@ -85,6 +92,7 @@ pub fn certify(
             ClaimKind::Region => vec![region(problem, &options.region)],
             ClaimKind::MovingGoal => moving_goal(problem, &document, &options.moving_goal),
             ClaimKind::SampledRegion => vec![sampled_region(problem, &options.sampled_region)],
+            ClaimKind::Disturbance => vec![disturbance(problem, &options.disturbance)],
             other => vec![not_proved(*other, Reason::FamilyNotCovered, None)],
         };
         document.claims.extend(made.into_iter().map(Into::into));

@@ -5,10 +5,11 @@
 //! a short move is nearly a jump, which only the radius limits.
 
 use certune_verify::{
-    Claim, ClaimKind, Document, GoalList, ListedGoal, MovingGoalClaim, Number, Reason, RegionClaim,
-    moving_goal_inequalities,
+    Claim, ClaimKind, Document, GoalList, ListedGoal, MovingGoalClaim, Number, Reason, RegionClaim, STATES,
+    moving_goal_inequalities, triangle,
 };
 
+use crate::digits::{above, down, readable};
 use crate::not_proved;
 use crate::problem::Problem;
 use crate::region::{RegionOptions, region};
@@ -99,11 +100,6 @@ pub fn moving_goal(problem: &Problem, document: &Document, options: &MovingGoalO
     refused(Reason::CandidateFailed)
 }
 
-/// A rate of three digits, so that it can be read.
-fn readable(rate: f64) -> f64 {
-    format!("{rate:.2e}").parse().unwrap_or(rate)
-}
-
 /// A coarse geometric grid, then halvings of its spacing around the best point. `None` when no rate gives a speed.
 fn best_rate(speed: impl Fn(f64) -> f64, options: &MovingGoalOptions) -> Option<f64> {
     let [first, last] = options.rates_per_s.map(f64::ln);
@@ -192,25 +188,6 @@ fn distance(from: &[f64], to: &[f64]) -> f64 {
     from.iter().zip(to).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Four digits, rounded down.
-fn down(x: f64) -> Option<Number> {
-    digits(x, f64::floor)
-}
-
-/// Four digits, rounded up.
-fn above(x: f64) -> Option<Number> {
-    digits(x, f64::ceil)
-}
-
-fn digits(x: f64, round: fn(f64) -> f64) -> Option<Number> {
-    if !(x > 0.0 && x.is_finite()) {
-        return None;
-    }
-    let decade = x.log10().floor() as i32 - 3;
-    let text = format!("{:.0}e{decade}", round(x / 10_f64.powi(decade)));
-    Number::decimal(text.parse().ok()?)
-}
-
 fn candidate(document: &Document, ramp: &Ramp, options: &MovingGoalOptions, shrink: f64) -> Option<MovingGoalClaim> {
     let smaller = 1.0 - shrink;
     let numbers = |values: &[f64]| values.iter().map(|&x| Number::decimal(x)).collect::<Option<Vec<_>>>();
@@ -251,20 +228,14 @@ fn largest_error(document: &Document, claim: &RegionClaim) -> Option<f64> {
     let bounds = &document.constants.bounds;
     let mut worst: f64 = 0.0;
     for m in [&bounds.m_lo_kg_m2, &bounds.m_hi_kg_m2] {
-        let m = m.to_f64();
-        // dq scaled by 1/sqrt m; the rest is left as it is.
-        let mut form = nalgebra::DMatrix::zeros(6, 6);
-        form[(0, 0)] = witness.p.to_f64();
-        for (k, b) in witness.b.iter().enumerate() {
-            form[(0, 1 + k)] = m.sqrt() * b.to_f64();
-            form[(1 + k, 0)] = form[(0, 1 + k)];
-        }
-        let places = (0..5).flat_map(|i| (i..5).map(move |j| (i, j)));
-        for ((i, j), s) in places.zip(&witness.s) {
-            form[(1 + i, 1 + j)] = s.to_f64();
-            form[(1 + j, 1 + i)] = s.to_f64();
-        }
-        worst = worst.max(form.try_inverse()?[(1, 1)]);
+        let root = m.to_f64().sqrt();
+        // dq scaled by 1/sqrt m.
+        let entry = |i: usize, j: usize| match (i.min(j), i.max(j)) {
+            (0, 0) => witness.p.to_f64(),
+            (0, j) => root * witness.b[j - 1].to_f64(),
+            (i, j) => witness.s[triangle(i - 1, j - 1)].to_f64(),
+        };
+        worst = worst.max(nalgebra::DMatrix::from_fn(1 + STATES, 1 + STATES, entry).try_inverse()?[(1, 1)]);
     }
     Some(worst.sqrt() * (1.0 + 1e-9))
 }
