@@ -9,17 +9,20 @@
 //! | `problem` | gains, family and constants of an arm as a document without claims |
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
+//! | `joint_region` | the same, an ellipsoid, with gains, frictions and limits of each joint |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
 #![forbid(unsafe_code)]
 
 mod exponential;
+mod joint_region;
 mod lmi;
 mod problem;
 mod region;
 
 pub use exponential::{UnstableLoop, exponential};
+pub use joint_region::{JointRegionOptions, joint_region};
 pub use lmi::{Affine, Program, Solution, SolveError};
 pub use problem::{
     AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, ProblemError, SampledConstantValues, arm_ranges,
@@ -49,6 +52,8 @@ pub enum CertifyError {
 pub struct Options {
     /// The region of the nonlinear loop.
     pub region: RegionOptions,
+    /// The region with gains, frictions and limits of each joint.
+    pub joint_region: JointRegionOptions,
 }
 
 /// Makes the claims about a problem, in the order asked for, and has them checked.
@@ -69,6 +74,7 @@ pub fn certify(
         let claim = match kind {
             ClaimKind::Exponential => exponential(problem, attain),
             ClaimKind::Region => region(problem, &options.region),
+            ClaimKind::JointRegion => joint_region(problem, &options.joint_region),
             other => not_proved(*other, Reason::FamilyNotCovered, None),
         };
         document.claims.push(claim.into());

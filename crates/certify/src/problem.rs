@@ -250,6 +250,18 @@ impl Problem {
         Ok(Self { document, records })
     }
 
+    /// The same problem with an interval of viscous friction for each joint, `[least, largest]`, N m s/rad.
+    ///
+    /// # Errors
+    /// [`ProblemError`] when a number cannot be written.
+    pub fn with_friction_of_joints(mut self, friction_n_m_s_per_rad: &[[f64; 2]]) -> Result<Self, ProblemError> {
+        self.document.family.friction_n_m_s_per_rad = friction_n_m_s_per_rad
+            .iter()
+            .map(|&ends| interval("friction_n_m_s_per_rad", ends))
+            .collect::<Result<_, _>>()?;
+        Ok(self)
+    }
+
     /// The records that the document's constants rest on; none when they were sampled.
     pub fn records(&self) -> &[Record] {
         &self.records

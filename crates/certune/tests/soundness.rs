@@ -226,7 +226,7 @@ fn hunt(name: &str, plant_box: &PlantBox, seed: u64) -> Attacked {
     let certifier = ArmCertifier::<N>::new(&robot, &family_of(plant_box).unwrap()).unwrap();
     // Less effort finds smaller regions and fewer attainable points; what it claims must be as true.
     let effort = Effort {
-        proofs: Options { region: RegionOptions { coarse: 4, refinements: 0, ..RegionOptions::default() } },
+        proofs: Options { region: RegionOptions { coarse: 4, refinements: 0, ..RegionOptions::default() }, ..Options::default() },
         counterexample: SearchOptions { samples: 64, local_starts: 0, enough: 0.0, ..SearchOptions::default() },
     };
     let all: Vec<Attacked> = (0..SETS_PER_FAMILY)
