@@ -320,6 +320,18 @@ impl Problem {
         Ok(Self { document, records })
     }
 
+    /// The same problem with an interval of viscous friction for each joint, `[least, largest]`, N m s/rad.
+    ///
+    /// # Errors
+    /// [`ProblemError`] when a number cannot be written.
+    pub fn with_friction_of_joints(mut self, friction_n_m_s_per_rad: &[[f64; 2]]) -> Result<Self, ProblemError> {
+        self.document.family.friction_n_m_s_per_rad = friction_n_m_s_per_rad
+            .iter()
+            .map(|&ends| interval("friction_n_m_s_per_rad", ends))
+            .collect::<Result<_, _>>()?;
+        Ok(self)
+    }
+
     /// The same problem over a box of configurations where M is enclosed: what was known over all angles holds there too.
     ///
     /// Proved constants become a record of the box that holds the enclosure as well.
