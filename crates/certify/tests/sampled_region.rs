@@ -9,7 +9,7 @@ use certune_verify::{Claim, Compensation, sampled_region_inequalities};
 
 #[test]
 fn look() {
-    for (k, d, c, lim, rate) in [(1, [1.0, 1.0], Compensation::Continuous, None, 0.01), (1, [1.0, 3.0], Compensation::Held, None, 0.01), (0, [1.0, 3.0], Compensation::Held, None, 0.01), (2, [1.0, 3.0], Compensation::Held, None, 0.01),
+    for (k, d, c, lim, rate) in [(1, [1.0, 1.0], Compensation::Continuous, None, 0.01), (1, [1.0, 3.0], Compensation::Held, None, 0.01), (0, [1.0, 3.0], Compensation::Held, None, 0.01), (2, [1.0, 3.0], Compensation::Held, None, 0.01),(1, [0.0, 0.0], Compensation::Continuous, None, 0.01),(0, [0.0, 0.0], Compensation::Continuous, None, 0.01),
      (1, [1.0, 1.0], Compensation::Held, Some(87.0), 0.01),(1, [1.0, 1.0], Compensation::Held, None, 0.3)] {
         let t = std::time::Instant::now();
         let p = problem(d);
