@@ -28,7 +28,7 @@ mod region;
 pub use disturbance::{DisturbanceOptions, disturbance};
 pub use exponential::{UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
-pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal};
+pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal, moving_goal_on};
 pub use problem::{
     AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, ProblemError, SampledConstantValues, arm_ranges,
 };
