@@ -13,15 +13,15 @@ use crate::number::Number;
 
 /// The norm of a region and how it shrinks.
 #[derive(Clone, Debug)]
-pub(crate) struct Norm {
+pub struct Norm {
     /// `s_i` of each joint, 1/rad^2: a goal moved by `delta` moves the state by at most the root of `sum_i s_i delta_i^2`.
-    pub(crate) shift_weights: Vec<BigRational>,
+    pub shift_weights: Vec<BigRational>,
     /// `sqrt V` shrinks at least as `exp(-rate t)`, or by `1 - rate h` each sample, 1/s.
-    pub(crate) rate: BigRational,
+    pub rate: BigRational,
     /// The sampling step h, s, where V is a function of the state at sample instants; none in continuous time.
-    pub(crate) period: Option<BigRational>,
+    pub period: Option<BigRational>,
     /// Each joint stays this close to its goal, rad, when the claim says so.
-    pub(crate) kept: Option<Vec<Number>>,
+    pub kept: Option<Vec<Number>>,
 }
 
 /// A claim about the set `{V <= 1}` that holds for a constant goal and stays meaningful when the goal changes.
@@ -48,4 +48,12 @@ pub(crate) fn region_before(document: &Document, position: usize, index: usize) 
         Some(Claim::JointRegion(claim)) => Ok(claim.as_ref()),
         _ => Err(none()),
     }
+}
+
+/// The norm of the region that the entry `index` of a document, counted from 1, proves.
+///
+/// # Errors
+/// [`Flaw`] when there is no such entry, it proves no region, or its V is no norm for every goal.
+pub fn region_norm(document: &Document, index: usize) -> Result<Norm, Flaw> {
+    region_before(document, document.claims.len(), index)?.norm(document)
 }
