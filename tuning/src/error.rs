@@ -91,6 +91,12 @@ pub enum Error {
     /// A readable certificate that a run cannot rest on.
     #[error("{}: the certificate is rejected: {source}", path.display())]
     Rejected { path: PathBuf, source: certune::verify::Rejection },
+    /// A record of proved constants that is none.
+    #[error("{}: not a record of proved constants: {source}", path.display())]
+    Record { path: PathBuf, source: VerifyError },
+    /// A readable record that contradicts itself or was edited.
+    #[error("{}: the record of proved constants is rejected: {source}", path.display())]
+    RecordRejected { path: PathBuf, source: certune::verify::Rejection },
     /// A folder without a file that every run has.
     #[error("cannot read {}: {source}", path.display())]
     NoRun { path: PathBuf, source: io::Error },
@@ -149,6 +155,9 @@ impl Error {
             Self::Io { action: "write", .. } => Some("another place that you may write to".to_owned()),
             Self::Certificate { .. } => Some("the certificate.json of a run, whole and unedited".to_owned()),
             Self::Rejected { .. } => Some("the certificate.json that the run wrote, or repeat the run".to_owned()),
+            Self::Record { .. } | Self::RecordRejected { .. } => {
+                Some("a file that `autotune constants` wrote, whole and unedited".to_owned())
+            }
             Self::NoRun { .. } | Self::RunRecord { .. } | Self::RunInconsistent { .. } => {
                 Some("a folder that `autotune tune` wrote".to_owned())
             }

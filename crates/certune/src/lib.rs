@@ -57,4 +57,7 @@ pub mod guide {}
 
 mod stability;
 
-pub use stability::{ArmCertifier, Effort, StabilityError, certificate_text, family_of, poles_per_s};
+pub use stability::{
+    ArmCertifier, ArmGains, Effort, Growth, Over, Request, StabilityError, TorqueLimits, certificate_text, claims_for,
+    family_of, growth, poles_per_s,
+};

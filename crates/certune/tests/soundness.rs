@@ -296,7 +296,7 @@ fn random_members_respect_the_constants() {
     };
     let robot = Robot::panda();
     let certifier = ArmCertifier::<N>::new(&robot, &family).unwrap();
-    let constants = &certifier.constants().constants;
+    let constants = &certifier.sampled().constants;
     let ranges = Ranges {
         mass_uncertainty: 0.2,
         payload_kg: [0.0, 0.7],

@@ -11,11 +11,11 @@ use certune::tune::{
     AicObjective, Batch, BatchError, Bench, Gains, HeldOut, Question, SearchError, SearchSettings, Space, TuneError,
     Tuned, tune,
 };
-use certune::verify::{Certificate, Claim, ClaimKind, Verdict};
-use certune::{ArmCertifier, StabilityError, family_of};
+use certune::verify::{Certificate, Claim, ClaimKind, Record, Verdict};
+use certune::{ArmCertifier, Growth, Over, StabilityError, family_of};
 use serde::Serialize;
 
-use super::claims::{ClaimSummary, claims_in_words, summaries};
+use super::claims::{ClaimSummary, claims_in_words, growths, summaries};
 use crate::catalogue::{self, DEFAULT_PRESET, GainsSource};
 use crate::cli::{Context, ControllerName, Exit, TuneArgs};
 use crate::error::Error;
@@ -41,6 +41,7 @@ struct Plan {
     robot_argument: String,
     scenario: Scenario,
     family: FamilyValues,
+    records: Vec<Record>,
     space: Space,
     start: Gains,
     question: Question,
@@ -87,7 +88,7 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
         // Only a folder that is empty goes; what keeps it from going is no part of the message.
         let _ = std::fs::remove_dir(&plan.folder.path);
     }
-    let (run, page) = outcome?;
+    let (run, page, growth) = outcome?;
     let files = plan.folder.write(&run, &page)?;
     let certified = run.file.record.winner.is_some();
     let claims = run.certificate.as_ref();
@@ -100,11 +101,11 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
             gains: run.file.record.tuned(),
             held_out: Compared { published: start.as_ref().map(spread), tuned: tuned.as_ref().map(spread) },
             about: claims.map(|certificate| certificate.document().about.clone()),
-            claims: claims.map(summaries).unwrap_or_default(),
+            claims: claims.map(|certificate| summaries(certificate, &growth)).unwrap_or_default(),
             elapsed_s: progress.elapsed_s(),
         })?;
     } else {
-        output::print(&in_words(&plan, &run, &files, progress.elapsed_s()))?;
+        output::print(&in_words(&plan, &run, &growth, &files, progress.elapsed_s()))?;
     }
     Ok(if certified { Exit::Holds } else { Exit::NotCertified })
 }
@@ -121,6 +122,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     let robot = catalogue::robot(&args.robot, args.tip.as_deref())?;
     let scenario = catalogue::scenario(args.scenario.as_deref(), &robot)?;
     let family = family_of(&scenario.plant_box)?;
+    let records = catalogue::records(&[])?;
     let (space_name, space) = catalogue::space(args.space.as_deref())?;
     let preset = space.start().unwrap_or(DEFAULT_PRESET).to_owned();
     let source = GainsSource::find(&preset)?;
@@ -145,6 +147,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
         robot,
         scenario,
         family,
+        records,
         space,
         start,
         folder: Folder { path },
@@ -164,7 +167,7 @@ fn run_name(robot: &Robot, controller: &str, seed: u64) -> String {
 }
 
 /// The run and its page.
-fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, String), Error> {
+fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, String, Vec<Option<Growth>>), Error> {
     let Plan { robot, scenario, question, .. } = plan;
     let seed = question.search.seed;
     let misfit = |error| match error {
@@ -178,8 +181,11 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
     let objective =
         AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
     let judge = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants).map_err(misfit)?;
-    progress.begin("sampling the arm's constants");
-    let certifier = ArmCertifier::<N>::new(robot, &plan.family)?;
+    let certifier = ArmCertifier::<N>::new(robot, &plan.family)?.with_records(&plan.records, &Over::AllAngles)?;
+    if certifier.record().is_none() {
+        progress.begin("sampling the arm's constants");
+        certifier.sampled();
+    }
     let bench = Bench { objective: &objective, judge: &judge, progress };
     let mut first_refusal: Option<Certificate> = None;
     let mut failure: Option<StabilityError> = None;
@@ -213,7 +219,8 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
     let run = Run { file, certificate: certificate.or(first_refusal) };
     progress.begin("writing the report");
     let page = page::page::<N>(&run, robot, &plan.robot_argument, &plan.folder)?;
-    Ok((run, page))
+    let growth = run.certificate.as_ref().map(|certificate| growths::<N>(robot, certificate)).transpose()?;
+    Ok((run, page, growth.unwrap_or_default()))
 }
 
 /// The claims that do not hold, in a few words.
@@ -254,7 +261,7 @@ pub fn beyond_the_claims(scenario: &Scenario) -> Option<String> {
     })
 }
 
-fn in_words(plan: &Plan, run: &Run, files: &[PathBuf], elapsed_s: f64) -> String {
+fn in_words(plan: &Plan, run: &Run, growth: &[Option<Growth>], files: &[PathBuf], elapsed_s: f64) -> String {
     let record = &run.file.record;
     let question = &record.question;
     let mut text = format!(
@@ -284,7 +291,7 @@ fn in_words(plan: &Plan, run: &Run, files: &[PathBuf], elapsed_s: f64) -> String
     text.push_str(&table(&header, &rows));
     let _ = writeln!(text);
     match (record.winner(), &run.certificate) {
-        (Some(_), Some(certificate)) => text.push_str(&claims_in_words(certificate, false)),
+        (Some(_), Some(certificate)) => text.push_str(&claims_in_words(certificate, growth, false)),
         (_, refusal) => {
             let reason = match record.certification.len() {
                 0 => "no candidate was stable and finished the task on every plant, so none came before the certifier"
@@ -298,7 +305,7 @@ fn in_words(plan: &Plan, run: &Run, files: &[PathBuf], elapsed_s: f64) -> String
             );
             if let Some(refusal) = refusal {
                 let _ = writeln!(text, "The best of them:");
-                text.push_str(&claims_in_words(refusal, false));
+                text.push_str(&claims_in_words(refusal, growth, false));
             }
         }
     }

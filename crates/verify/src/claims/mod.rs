@@ -89,6 +89,20 @@ pub enum ClaimKind {
 }
 
 impl ClaimKind {
+    /// Every kind.
+    pub const ALL: [Self; 10] = [
+        Self::Exponential,
+        Self::Sampled,
+        Self::Region,
+        Self::JointRegion,
+        Self::SampledRegion,
+        Self::MovingGoal,
+        Self::Disturbance,
+        Self::Lyapunov,
+        Self::AdaptiveConvergence,
+        Self::PiExponential,
+    ];
+
     /// The name as it is written in files and flags.
     pub fn name(self) -> &'static str {
         match self {

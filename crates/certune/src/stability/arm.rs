@@ -1,0 +1,128 @@
+//! An arm with a family of plants and the constants that bound it.
+
+use std::sync::OnceLock;
+
+use certune_bounds::{ArmBox, BoundsError, Ranges, SampledConstants, SamplingOptions, sampled_constants};
+use certune_certify::{ArmValues, ConstantValues, FamilyValues, Problem, arm_ranges, certify};
+use certune_control::aic::{AicGains, AicParams};
+use certune_control::mrac::MracParams;
+use certune_dynamics::{Model, Payload, Robot};
+use certune_verify::{Arm, Certificate, ClaimKind, Record};
+
+use super::constants::{Over, best_record, sampled_values};
+use super::gains::ArmGains;
+use super::request::{Effort, Request, claims_for};
+use super::{STEP_S, StabilityError};
+
+/// An arm with a family of plants, ready to certify any number of gains.
+///
+/// Its constants are those of a proved record that covers the family, when one was given; otherwise they are sampled, once, when they are first
+/// needed.
+#[derive(Clone, Debug)]
+pub struct ArmCertifier<const N: usize> {
+    robot: Robot,
+    arm: ArmValues,
+    pub(super) family: FamilyValues,
+    pub(super) members: ArmBox<N>,
+    record: Option<Record>,
+    sampled: OnceLock<SampledConstants>,
+}
+
+impl<const N: usize> ArmCertifier<N> {
+    /// The family's arms, with sampled constants over all angles.
+    ///
+    /// # Errors
+    /// When the robot has not `N` joints or a range of the family is not valid.
+    pub fn new(robot: &Robot, family: &FamilyValues) -> Result<Self, StabilityError> {
+        let ranges = Ranges {
+            mass_uncertainty: family.mass_uncertainty,
+            payload_kg: family.payload_kg,
+            payload_com_m: Payload::at_grasp(robot, 1.0)?.com_m,
+            rotor_inertia_kg_m2: family.rotor_inertia_kg_m2,
+        };
+        let [least, largest] = family.friction_n_m_s_per_rad;
+        if !(least >= 0.0 && least <= largest && largest.is_finite()) {
+            return Err(BoundsError::Axis { axis: 0, lower: least, upper: largest }.into());
+        }
+        let members = ArmBox::new(&Model::<N>::new(robot)?, &ranges)?;
+        let arm = ArmValues {
+            name: robot.name().to_owned(),
+            joints: N,
+            sha256: robot.sha256(),
+            payload_com_m: ranges.payload_com_m,
+        };
+        Ok(Self { robot: robot.clone(), arm, family: family.clone(), members, record: None, sampled: OnceLock::new() })
+    }
+
+    /// The same arms with the constants of the best of the records that covers them over the set, if one does.
+    ///
+    /// # Errors
+    /// [`StabilityError::Problem`] when a number of the family cannot be written.
+    pub fn with_records(self, records: &[Record], over: &Over) -> Result<Self, StabilityError> {
+        let arm = Arm { name: self.arm.name.clone(), joints: N, sha256: self.arm.sha256.clone() };
+        let ranges = arm_ranges(&self.arm, &self.family)?;
+        let record = best_record(records, &arm, &ranges, &over.written(&self.robot)).cloned();
+        Ok(Self { record, ..self })
+    }
+
+    /// The record whose proved constants the claims rest on; `None` when they rest on sampled ones.
+    pub fn record(&self) -> Option<&Record> {
+        self.record.as_ref()
+    }
+
+    /// The sampled constants, with the configurations that attain them. The first call takes a second or two.
+    pub fn sampled(&self) -> &SampledConstants {
+        self.sampled.get_or_init(|| sampled_constants(&self.members, &SamplingOptions::default()))
+    }
+
+    /// The family of plants.
+    pub fn family(&self) -> &FamilyValues {
+        &self.family
+    }
+
+    /// Makes the claims about an AIC and has them checked. Whether they hold is for the certificate to say.
+    ///
+    /// # Errors
+    /// When the gains are not valid; [`StabilityError::Certify`] would be a defect of this workspace.
+    pub fn certify(&self, gains: &AicGains<N>, claims: &[ClaimKind]) -> Result<Certificate, StabilityError> {
+        self.certify_with(gains, claims, &Effort::default())
+    }
+
+    /// As [`ArmCertifier::certify`], with an effort of one's own.
+    ///
+    /// # Errors
+    /// As [`ArmCertifier::certify`].
+    pub fn certify_with(
+        &self,
+        gains: &AicGains<N>,
+        claims: &[ClaimKind],
+        effort: &Effort,
+    ) -> Result<Certificate, StabilityError> {
+        self.answer(&(*gains).into(), &Request { claims: claims.to_vec(), effort: *effort, ..Request::default() })
+    }
+
+    /// Makes the claims that are asked for about a controller and has them checked.
+    ///
+    /// # Errors
+    /// As [`ArmCertifier::certify`].
+    pub fn answer(&self, gains: &ArmGains<N>, request: &Request) -> Result<Certificate, StabilityError> {
+        let params = match gains {
+            ArmGains::Aic(gains) => Some(AicParams::new(gains, STEP_S)?),
+            ArmGains::Mrac(gains) => MracParams::new(gains, STEP_S).map(|_| None)?,
+        };
+        let constants = match &self.record {
+            Some(record) => ConstantValues::Proved(Box::new(record.clone())),
+            None => sampled_values(self.sampled()),
+        };
+        let problem = Problem::new(&self.arm, gains.written()?, &self.family, &constants)?;
+        let attain = || self.unstable_member(params.as_ref()?, &request.effort.counterexample).ok().flatten();
+        let all;
+        let claims = if request.claims.is_empty() {
+            all = claims_for(gains);
+            &all
+        } else {
+            &request.claims
+        };
+        Ok(certify(&problem, claims, &request.effort.proofs, &attain)?)
+    }
+}
