@@ -4,6 +4,8 @@
 //! `certificates/<name>.json`. `cargo xtask claims` writes the certificates again.
 #![forbid(unsafe_code)]
 
+pub mod map;
+
 use std::path::{Path, PathBuf};
 
 use certune::certify::FamilyValues;

@@ -150,7 +150,7 @@ fn certificate<const N: usize>(
         Some(record) => progress.detail(|| format!("          proved constants: record {}", record.sha256)),
         None => {
             progress.begin("sampling the arm's constants");
-            let constants = certifier.sampled().constants;
+            let constants = certifier.constants().constants;
             progress.detail(|| {
                 format!(
                     "          m_lo {:.4} kg m², m_hi {:.3} kg m², k_g {:.2} N m/rad, k_c {:.3} kg m², k_r {:.2}",

@@ -184,7 +184,7 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
     let certifier = ArmCertifier::<N>::new(robot, &plan.family)?.with_records(&plan.records, &Over::AllAngles)?;
     if certifier.record().is_none() {
         progress.begin("sampling the arm's constants");
-        certifier.sampled();
+        certifier.constants();
     }
     let bench = Bench { objective: &objective, judge: &judge, progress };
     let mut first_refusal: Option<Certificate> = None;

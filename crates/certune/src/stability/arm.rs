@@ -71,7 +71,7 @@ impl<const N: usize> ArmCertifier<N> {
     }
 
     /// The sampled constants, with the configurations that attain them. The first call takes a second or two.
-    pub fn sampled(&self) -> &SampledConstants {
+    pub fn constants(&self) -> &SampledConstants {
         self.sampled.get_or_init(|| sampled_constants(&self.members, &SamplingOptions::default()))
     }
 
@@ -112,7 +112,7 @@ impl<const N: usize> ArmCertifier<N> {
         };
         let constants = match &self.record {
             Some(record) => ConstantValues::Proved(Box::new(record.clone())),
-            None => sampled_values(self.sampled()),
+            None => sampled_values(self.constants()),
         };
         let problem = Problem::new(&self.arm, gains.written()?, &self.family, &constants)?;
         let attain = || self.unstable_member(params.as_ref()?, &request.effort.counterexample).ok().flatten();
