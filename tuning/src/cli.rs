@@ -7,6 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use certune::TorqueLimits;
+use certune::tune::ObjectiveName;
 use certune::verify::ClaimKind;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
@@ -15,7 +16,7 @@ use crate::commands::{certify, inspect, lists, report, simulate, tune, verify};
 use crate::error::Error;
 use crate::output;
 use crate::values::{
-    ARMS_OWN, Interval, Numbers, claim, delay, interval, non_negative, numbers, share, threads, torque_limits,
+    ARMS_OWN, Interval, Numbers, claim, delay, interval, non_negative, numbers, objective, share, threads, torque_limits,
 };
 
 const AFTER_HELP: &str = "\
@@ -109,6 +110,9 @@ pub struct TuneArgs {
     /// Scenario by name or TOML file [default: pick-and-place; for a URDF file a generic one]
     #[arg(long, value_name = "NAME|FILE")]
     pub scenario: Option<String>,
+    /// What the search is after [default: as the search space says, or settling-cost]
+    #[arg(long, value_name = "settling-cost|certified-rate|certified-radius", value_parser = objective)]
+    pub objective: Option<ObjectiveName>,
     /// Candidates to evaluate [default: 100]
     #[arg(long, value_name = "N")]
     pub budget: Option<usize>,

@@ -3,6 +3,7 @@
 use certune::TorqueLimits;
 use certune::closed_loop::file::nearest;
 use certune::closed_loop::simulate::MAX_DELAY_SAMPLES;
+use certune::tune::ObjectiveName;
 use certune::verify::ClaimKind;
 
 /// A closed interval of numbers that are not negative.
@@ -54,6 +55,15 @@ pub fn threads(text: &str) -> Result<usize, String> {
         Ok(count) => Ok(count),
         Err(_) => Err("expected a number of threads, 1 or more".to_owned()),
     }
+}
+
+/// An objective by its name.
+pub fn objective(text: &str) -> Result<ObjectiveName, String> {
+    let names = || ObjectiveName::ALL.iter().map(|objective| objective.name());
+    ObjectiveName::ALL.into_iter().find(|objective| objective.name() == text).ok_or_else(|| {
+        let meant = nearest(text, names()).map(|nearest| format!("did you mean `{nearest}`? ")).unwrap_or_default();
+        format!("no such objective; {meant}the objectives are {}", names().collect::<Vec<_>>().join(", "))
+    })
 }
 
 /// A claim by its name.

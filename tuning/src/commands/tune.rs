@@ -8,11 +8,11 @@ use certune::closed_loop::Scenario;
 use certune::dynamics::{Robot, for_joint_count};
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::{
-    AicObjective, Batch, BatchError, Bench, Gains, HeldOut, Question, SearchError, SearchSettings, Space, TuneError,
+    AicObjective, Batch, BatchError, Bench, Evaluation, Gains, HeldOut, Objective, ObjectiveName, Outcome, Question, SearchError, SearchSettings, Space, TuneError,
     Tuned, tune,
 };
 use certune::verify::{Certificate, Claim, ClaimKind, Record, Verdict};
-use certune::{ArmCertifier, Growth, Over, StabilityError, family_of};
+use certune::{ArmCertifier, CertifiedObjective, Growth, Over, StabilityError, family_of};
 use serde::Serialize;
 
 use super::claims::{ClaimSummary, claims_in_words, growths, summaries};
@@ -21,7 +21,7 @@ use crate::cli::{Context, ControllerName, Exit, TuneArgs};
 use crate::error::Error;
 use crate::output::{self, number, table};
 use crate::page::{self, Spread, spread};
-use crate::progress::Terminal;
+use crate::progress::{Terminal, achieved};
 use crate::run::{Folder, Run, RunFile};
 use crate::versions::versions;
 
@@ -78,7 +78,7 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
         .map_err(|source| Error::Threads { threads, source })?;
     let existed = plan.folder.path.exists();
     output::prepare_folder(&plan.folder.path)?;
-    let progress = Terminal::new(context.verbose);
+    let progress = Terminal::new(context.verbose).after(plan.question.objective);
     let outcome = pool.install(|| {
         for_joint_count!(plan.robot.joints(), N => tune_arm::<N>(&plan, &progress))
             .unwrap_or_else(|| Err(catalogue::too_many_joints(&plan.robot)))
@@ -138,6 +138,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
             robot_sha256: robot.sha256(),
             scenario: scenario.name.clone(),
             versions: versions(),
+            objective: args.objective.unwrap_or_else(|| space.objective()),
             search: SearchSettings::new(space.method(), budget, seed),
             batch_plants: BATCH_PLANTS,
             held_out_plants: HELD_OUT_PLANTS,
@@ -178,15 +179,22 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
         },
         BatchError::NoPlants | BatchError::Plant(_) => Error::Batch(error),
     };
-    let objective =
-        AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
     let judge = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants).map_err(misfit)?;
     let certifier = ArmCertifier::<N>::new(robot, &plan.family)?.with_records(&plan.records, &Over::AllAngles)?;
     if certifier.record().is_none() {
         progress.begin("sampling the arm's constants");
         certifier.constants();
     }
-    let bench = Bench { objective: &objective, judge: &judge, progress };
+    let simulated =
+        AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
+    let certified =
+        CertifiedObjective::new(question.objective, &certifier, (robot, scenario), seed, DEFAULT_SAMPLES)
+            .map_err(misfit)?;
+    let objective: &dyn Objective = match &certified {
+        Some(certified) => certified,
+        None => &simulated,
+    };
+    let bench = Bench { objective, judge: &judge, progress };
     let mut first_refusal: Option<Certificate> = None;
     let mut failure: Option<StabilityError> = None;
     let certify = |gains: &Gains| match certifier
@@ -265,12 +273,22 @@ fn in_words(plan: &Plan, run: &Run, growth: &[Option<Growth>], files: &[PathBuf]
     let record = &run.file.record;
     let question = &record.question;
     let mut text = format!(
-        "{} under the AIC in {}: {} candidates on {} plants, {elapsed_s:.1} s\n\n",
+        "{} under the AIC in {}: {} candidates{}, {elapsed_s:.1} s\n\n",
         question.robot,
         question.scenario,
         record.evaluations.len(),
-        question.batch_plants
+        match question.objective {
+            ObjectiveName::SettlingCost => format!(" on {} plants", question.batch_plants),
+            objective => format!(" for the largest {}", objective.name().replace('-', " ")),
+        }
     );
+    if question.objective != ObjectiveName::SettlingCost {
+        let reached = |evaluation: Option<&Evaluation>| match evaluation.map(|evaluation| evaluation.outcome) {
+            Some(Outcome::Certified { cost }) => achieved(cost.get(), question.objective),
+            _ => "not certified".to_owned(),
+        };
+        let _ = writeln!(text, "{}: {}; tuned: {}\n", run.file.preset, reached(record.start()), reached(record.winner()));
+    }
     let HeldOut { start, tuned } = &record.held_out;
     let [published, tuned] = [start, tuned].map(|verdict| verdict.as_ref().map(spread));
     let row = |name: &str, digits: usize, scale: f64, value: fn(&Spread) -> Option<f64>| {

@@ -165,7 +165,7 @@ fn gain_rows(record: &RunRecord, gains: &Pair<Gains>) -> Vec<GainRow> {
 fn search(record: &RunRecord) -> SearchRecord {
     let mut best_so_far: Option<f64> = None;
     let evaluations = record.evaluations.iter().map(|evaluation| {
-        let cost = evaluation.outcome.cost_s();
+        let cost = evaluation.outcome.cost();
         best_so_far = match (best_so_far, cost) {
             (Some(best), Some(cost)) => Some(best.min(cost)),
             (best, cost) => best.or(cost),
@@ -192,13 +192,13 @@ fn search(record: &RunRecord) -> SearchRecord {
     });
     SearchRecord {
         evaluations: evaluations.collect(),
-        published_cost: record.start().and_then(|start| start.outcome.cost_s()),
+        published_cost: record.start().and_then(|start| start.outcome.cost()),
     }
 }
 
 fn sensitivity(record: &RunRecord) -> Vec<SensitivityRow> {
-    let Some(cost) = record.winner().and_then(|winner| winner.outcome.cost_s()) else { return Vec::new() };
-    let ratio = |outcome: Outcome| outcome.cost_s().map(|changed| changed / cost);
+    let Some(cost) = record.winner().and_then(|winner| winner.outcome.cost()) else { return Vec::new() };
+    let ratio = |outcome: Outcome| outcome.cost().map(|changed| changed / cost);
     let row = |row: &certune::tune::Sensitivity| SensitivityRow {
         gain: row.gain.key().to_owned(),
         ratio_at_minus_10_percent: ratio(row.at_minus_10_percent),

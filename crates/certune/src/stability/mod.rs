@@ -7,6 +7,7 @@
 //! | `request` | what is asked of a certifier, and which claims a controller can have |
 //! | `gains` | gains of either controller, as a certificate writes them |
 //! | `counterexample`, `growth` | for a refusal: an unstable member of the family, and a simulation that shows it |
+//! | `objective` | a certified figure as the objective of a search |
 //! | `poles` | a map of poles |
 
 mod arm;
@@ -14,6 +15,7 @@ mod constants;
 mod counterexample;
 mod gains;
 mod growth;
+mod objective;
 mod poles;
 mod request;
 
@@ -29,6 +31,7 @@ pub use arm::ArmCertifier;
 pub use constants::Over;
 pub use gains::ArmGains;
 pub use growth::{Growth, growth};
+pub use objective::CertifiedObjective;
 pub use poles::poles_per_s;
 pub use request::{Effort, Request, TorqueLimits, claims_for};
 
