@@ -45,7 +45,7 @@ pub enum CertifyError {
 }
 
 /// How each kind of claim is searched.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// The region of the nonlinear loop.
     pub region: RegionOptions,

@@ -34,11 +34,13 @@ mod quantity;
 mod record;
 mod statement;
 
-pub use aic::AicGains;
+pub use aic::{AicGains, Controller, STATES};
 pub use check::{Certificate, Checked, seal, verify};
 pub use claims::{
-    Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, Figure, Inequality, LoopBox, LoopFamily, NotProvedClaim,
-    Reason, RefusedClaim, RegionClaim, RegionWitness, Verdict, family_box, region_inequalities,
+    Attained, BoxPoint, Claim, ClaimKind, CoveredSteps, Energy, ExponentialClaim, Figure, Inequality, JointProblem,
+    JointRegionClaim, JointRegionWitness, JointWeights, LoopBox, LoopFamily, NotProvedClaim, Plant, Point, Reason,
+    RefusedClaim, RegionClaim, RegionProblem, RegionWitness, State, TRIANGLE, Verdict, family_box,
+    joint_region_inequalities, region_inequalities, triangle,
 };
 pub use document::{Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade};
 pub use error::{Flaw, Rejection, VerifyError};

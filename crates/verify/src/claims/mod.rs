@@ -1,6 +1,8 @@
 //! The kinds of claims. Each file holds what one kind states, its words, and its proof.
 
+mod energy;
 mod exponential;
+mod joint_region;
 mod not_proved;
 mod refused;
 mod region;
@@ -13,10 +15,14 @@ use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
 
+pub use energy::{Energy, Plant, Point, State, TRIANGLE, triangle};
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
+pub use joint_region::{
+    CoveredSteps, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights, joint_region_inequalities,
+};
 pub use not_proved::{NotProvedClaim, Reason};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
-pub use region::{RegionClaim, RegionWitness, region_inequalities};
+pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
 
 /// What an entry of a document claims.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,6 +32,8 @@ pub enum Claim {
     Exponential(ExponentialClaim),
     /// The nonlinear loop decays from every start in a ball.
     Region(Box<RegionClaim>),
+    /// The same with gains, frictions and limits of each joint.
+    JointRegion(Box<JointRegionClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -37,6 +45,7 @@ impl Claim {
         match self {
             Self::Exponential(claim) => claim,
             Self::Region(claim) => claim.as_ref(),
+            Self::JointRegion(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -52,7 +61,7 @@ impl Claim {
         match self {
             Self::Refused(_) => Verdict::Refused,
             Self::NotProved(_) => Verdict::NotProved,
-            Self::Exponential(_) | Self::Region(_) => Verdict::Holds,
+            Self::Exponential(_) | Self::Region(_) | Self::JointRegion(_) => Verdict::Holds,
         }
     }
 
