@@ -16,7 +16,8 @@ use crate::commands::{certify, inspect, lists, report, simulate, tune, verify};
 use crate::error::Error;
 use crate::output;
 use crate::values::{
-    ARMS_OWN, Interval, Numbers, claim, delay, interval, non_negative, numbers, objective, share, threads, torque_limits,
+    ARMS_OWN, Interval, Numbers, claim, delay, interval, non_negative, numbers, objective, share, threads,
+    torque_limits,
 };
 
 const AFTER_HELP: &str = "\

@@ -146,6 +146,9 @@ impl Error {
                 Some("`autotune simulate` runs mrac gains; use aic gains here, see `autotune presets`".to_owned())
             }
             Self::ListLength { joints, .. } => Some(format!("{joints} numbers separated by commas, base to tip")),
+            Self::Stability(StabilityError::NoTorqueLimit { .. }) => {
+                Some("--torque-limits with a number, or an `effort` for every joint in the URDF file".to_owned())
+            }
             Self::Stability(StabilityError::Delay { .. }) => Some("a scenario without delay".to_owned()),
             Self::Tune(TuneError::Search(SearchError::NoBudget)) => Some("--budget 1 or more".to_owned()),
             Self::Tune(TuneError::Search(SearchError::Start(_))) => {

@@ -99,7 +99,12 @@ impl Progress for Terminal {
         self.bar.set_message(format!("best {}", self.in_words(best.outcome)));
         if evaluation.index == best.index {
             self.detail(|| {
-                format!("[{:5.1} s] candidate {}: {}", self.elapsed_s(), evaluation.index, self.in_words(evaluation.outcome))
+                format!(
+                    "[{:5.1} s] candidate {}: {}",
+                    self.elapsed_s(),
+                    evaluation.index,
+                    self.in_words(evaluation.outcome)
+                )
             });
         }
     }

@@ -58,6 +58,6 @@ pub mod guide {}
 mod stability;
 
 pub use stability::{
-    ArmCertifier, ArmGains, CertifiedObjective, Effort, Growth, Over, Request, StabilityError, TorqueLimits, certificate_text, claims_for,
-    family_of, growth, poles_per_s,
+    ArmCertifier, ArmGains, CertifiedObjective, Effort, Growth, Over, Request, StabilityError, TorqueLimits,
+    certificate_text, claims_for, family_of, growth, poles_per_s,
 };

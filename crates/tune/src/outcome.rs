@@ -152,9 +152,7 @@ impl Outcome {
     /// The cost, for an outcome that has one.
     pub const fn cost(self) -> Option<f64> {
         match self {
-            Self::Certified { cost } | Self::Simulated { cost } | Self::Uncertified { cost } => {
-                Some(cost.get())
-            }
+            Self::Certified { cost } | Self::Simulated { cost } | Self::Uncertified { cost } => Some(cost.get()),
             Self::Unstable { .. } | Self::Diverged { .. } => None,
         }
     }

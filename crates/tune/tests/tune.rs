@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use certune_tune::{
-    Bench, Evaluation, Finite, Freedom, Gain, Gains, Judge, Method, ObjectiveName, Outcome, Progress, Question, Range, RunRecord,
-    Scale, SearchSettings, Space, Stage, TuneError, TuneProgress, Tuned, Verdict, tune,
+    Bench, Evaluation, Finite, Freedom, Gain, Gains, Judge, Method, ObjectiveName, Outcome, Progress, Question, Range,
+    RunRecord, Scale, SearchSettings, Space, Stage, TuneError, TuneProgress, Tuned, Verdict, tune,
 };
 
 fn space() -> Space {

@@ -8,8 +8,8 @@ use certune::closed_loop::Scenario;
 use certune::dynamics::{Robot, for_joint_count};
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::{
-    AicObjective, Batch, BatchError, Bench, Evaluation, Gains, HeldOut, Objective, ObjectiveName, Outcome, Question, SearchError, SearchSettings, Space, TuneError,
-    Tuned, tune,
+    AicObjective, Batch, BatchError, Bench, Evaluation, Gains, HeldOut, Objective, ObjectiveName, Outcome, Question,
+    SearchError, SearchSettings, Space, TuneError, Tuned, tune,
 };
 use certune::verify::{Certificate, Claim, ClaimKind, Record, Verdict};
 use certune::{ArmCertifier, CertifiedObjective, Growth, Over, StabilityError, family_of};
@@ -187,9 +187,8 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
     }
     let simulated =
         AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
-    let certified =
-        CertifiedObjective::new(question.objective, &certifier, (robot, scenario), seed, DEFAULT_SAMPLES)
-            .map_err(misfit)?;
+    let certified = CertifiedObjective::new(question.objective, &certifier, (robot, scenario), seed, DEFAULT_SAMPLES)
+        .map_err(misfit)?;
     let objective: &dyn Objective = match &certified {
         Some(certified) => certified,
         None => &simulated,
@@ -287,7 +286,8 @@ fn in_words(plan: &Plan, run: &Run, growth: &[Option<Growth>], files: &[PathBuf]
             Some(Outcome::Certified { cost }) => achieved(cost.get(), question.objective),
             _ => "not certified".to_owned(),
         };
-        let _ = writeln!(text, "{}: {}; tuned: {}\n", run.file.preset, reached(record.start()), reached(record.winner()));
+        let _ =
+            writeln!(text, "{}: {}; tuned: {}\n", run.file.preset, reached(record.start()), reached(record.winner()));
     }
     let HeldOut { start, tuned } = &record.held_out;
     let [published, tuned] = [start, tuned].map(|verdict| verdict.as_ref().map(spread));

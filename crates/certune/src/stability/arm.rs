@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use certune_bounds::{ArmBox, BoundsError, Ranges, SampledConstants, SamplingOptions, sampled_constants};
-use certune_certify::{ArmValues, ConstantValues, FamilyValues, Problem, arm_ranges, certify};
+use certune_certify::{ArmValues, ConstantValues, FamilyValues, Options, Problem, arm_ranges, certify};
 use certune_control::aic::{AicGains, AicParams};
 use certune_control::mrac::MracParams;
 use certune_dynamics::{Model, Payload, Robot};
@@ -11,7 +11,7 @@ use certune_verify::{Arm, Certificate, ClaimKind, Record};
 
 use super::constants::{Over, best_record, sampled_values};
 use super::gains::ArmGains;
-use super::request::{Effort, Request, claims_for};
+use super::request::{Effort, Request, TorqueLimits, claims_for};
 use super::{STEP_S, StabilityError};
 
 /// An arm with a family of plants, ready to certify any number of gains.
@@ -98,7 +98,10 @@ impl<const N: usize> ArmCertifier<N> {
         claims: &[ClaimKind],
         effort: &Effort,
     ) -> Result<Certificate, StabilityError> {
-        self.answer(&(*gains).into(), &Request { claims: claims.to_vec(), effort: *effort, ..Request::default() })
+        self.answer(
+            &(*gains).into(),
+            &Request { claims: claims.to_vec(), effort: effort.clone(), ..Request::default() },
+        )
     }
 
     /// Makes the claims that are asked for about a controller and has them checked.
@@ -115,6 +118,7 @@ impl<const N: usize> ArmCertifier<N> {
             None => sampled_values(self.constants()),
         };
         let problem = Problem::new(&self.arm, gains.written()?, &self.family, &constants)?;
+        let options = self.options(request)?;
         let attain = || self.unstable_member(params.as_ref()?, &request.effort.counterexample).ok().flatten();
         let all;
         let claims = if request.claims.is_empty() {
@@ -123,6 +127,26 @@ impl<const N: usize> ArmCertifier<N> {
         } else {
             &request.claims
         };
-        Ok(certify(&problem, claims, &request.effort.proofs, &attain)?)
+        Ok(certify(&problem, claims, &options, &attain)?)
+    }
+
+    /// The search as the request wants it.
+    fn options(&self, request: &Request) -> Result<Options, StabilityError> {
+        let mut options = request.effort.proofs.clone();
+        match request.torque_limits {
+            TorqueLimits::None => {}
+            TorqueLimits::Norm(limit) => options.region.controller_torque_n_m = Some(limit),
+            TorqueLimits::LessGravity => options.region.motor_limits_n_m = Some(self.motor_limits_n_m()?),
+        }
+        Ok(options)
+    }
+
+    /// The motors' limits, every joint's.
+    fn motor_limits_n_m(&self) -> Result<Vec<f64>, StabilityError> {
+        let limits: Vec<f64> = self.robot.links().iter().map(|link| link.limits.torque_n_m).collect();
+        match limits.iter().position(|limit| !limit.is_finite()) {
+            Some(joint) => Err(StabilityError::NoTorqueLimit { joint: self.robot.links()[joint].joint_name.clone() }),
+            None => Ok(limits),
+        }
     }
 }

@@ -49,6 +49,12 @@ pub enum StabilityError {
         /// Largest delay of the box, samples.
         samples: usize,
     },
+    /// Torque limits were asked for, and the robot's description has none for a joint.
+    #[error("the robot's description states no torque limit for joint `{joint}`")]
+    NoTorqueLimit {
+        /// The joint's name.
+        joint: String,
+    },
     /// The arm cannot be compiled or carry the payload.
     #[error(transparent)]
     Robot(#[from] RobotError),

@@ -19,7 +19,7 @@ pub enum TorqueLimits {
 }
 
 /// How hard a certificate is searched.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Effort {
     /// The search for proofs.
     pub proofs: Options,
