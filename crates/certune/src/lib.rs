@@ -55,9 +55,11 @@ pub use certune_verify as verify;
 #[doc = include_str!("_docs/architecture.md")]
 pub mod guide {}
 
+mod adaptive;
 mod stability;
 
+pub use adaptive::AdaptiveSetting;
 pub use stability::{
-    ArmCertifier, ArmGains, CertifiedObjective, Effort, Growth, Over, Request, StabilityError, TorqueLimits,
+    Answer, ArmCertifier, ArmGains, CertifiedObjective, Effort, Growth, Over, Request, StabilityError, TorqueLimits,
     certificate_text, claims_for, family_of, growth, poles_per_s,
 };

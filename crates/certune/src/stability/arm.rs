@@ -5,13 +5,14 @@ use std::sync::OnceLock;
 use certune_bounds::{ArmBox, BoundsError, Ranges, SampledConstants, SamplingOptions, sampled_constants};
 use certune_certify::{ArmValues, ConstantValues, FamilyValues, Options, Problem, arm_ranges, certify};
 use certune_control::aic::{AicGains, AicParams};
-use certune_control::mrac::MracParams;
 use certune_dynamics::{Model, Payload, Robot};
-use certune_verify::{Arm, Certificate, ClaimKind, Record};
+use certune_verify::{Arm, Certificate, ClaimKind, Gains, Record};
+
+use crate::adaptive::AdaptiveSetting;
 
 use super::constants::{Over, best_record, sampled_values};
 use super::gains::ArmGains;
-use super::request::{Effort, Request, TorqueLimits, claims_for};
+use super::request::{Answer, Effort, Request, TorqueLimits, claims_for};
 use super::{STEP_S, StabilityError};
 
 /// An arm with a family of plants, ready to certify any number of gains.
@@ -80,6 +81,20 @@ impl<const N: usize> ArmCertifier<N> {
         &self.family
     }
 
+    /// The box of arms.
+    pub(crate) fn members(&self) -> &ArmBox<N> {
+        &self.members
+    }
+
+    /// The problem of these gains, without claims.
+    pub(crate) fn problem(&self, gains: Gains) -> Result<Problem, StabilityError> {
+        let constants = match &self.record {
+            Some(record) => ConstantValues::Proved(Box::new(record.clone())),
+            None => sampled_values(self.constants()),
+        };
+        Ok(Problem::new(&self.arm, gains, &self.family, &constants)?)
+    }
+
     /// Makes the claims about an AIC and has them checked. Whether they hold is for the certificate to say.
     ///
     /// # Errors
@@ -108,26 +123,26 @@ impl<const N: usize> ArmCertifier<N> {
     ///
     /// # Errors
     /// As [`ArmCertifier::certify`].
-    pub fn answer(&self, gains: &ArmGains<N>, request: &Request) -> Result<Certificate, StabilityError> {
-        let params = match gains {
-            ArmGains::Aic(gains) => Some(AicParams::new(gains, STEP_S)?),
-            ArmGains::Mrac(gains) => MracParams::new(gains, STEP_S).map(|_| None)?,
-        };
-        let constants = match &self.record {
-            Some(record) => ConstantValues::Proved(Box::new(record.clone())),
-            None => sampled_values(self.constants()),
-        };
-        let problem = Problem::new(&self.arm, gains.written()?, &self.family, &constants)?;
-        let options = self.options(request)?;
-        let attain = || self.unstable_member(params.as_ref()?, &request.effort.counterexample).ok().flatten();
-        let all;
-        let claims = if request.claims.is_empty() {
-            all = claims_for(gains);
-            &all
-        } else {
-            &request.claims
-        };
-        Ok(certify(&problem, claims, &options, &attain)?)
+    pub fn answer(&self, gains: &ArmGains<N>, request: &Request) -> Result<Answer, StabilityError> {
+        let claims = if request.claims.is_empty() { claims_for(gains) } else { request.claims.clone() };
+        match gains {
+            ArmGains::Aic(aic) => {
+                let params = AicParams::new(aic, STEP_S)?;
+                let problem = self.problem(gains.written()?)?;
+                let options = self.options(request)?;
+                let attain = || self.unstable_member(&params, &request.effort.counterexample).ok().flatten();
+                let certificate = certify(&problem, &claims, &options, &attain)?;
+                Ok(Answer { certificate, records: problem.records().to_vec() })
+            }
+            ArmGains::Mrac(mrac) => {
+                let goal = request.at_rad.as_deref().and_then(|at| <[f64; N]>::try_from(at).ok());
+                let setting = AdaptiveSetting {
+                    delay_samples: u32::try_from(request.delay_samples).unwrap_or(u32::MAX),
+                    ..AdaptiveSetting::around(goal.ok_or(StabilityError::NoConfiguration { joints: N })?)
+                };
+                self.answer_adaptive(mrac, &setting, &claims)
+            }
+        }
     }
 
     /// The search as the request wants it.

@@ -1,9 +1,9 @@
 //! Gains of either controller for an arm of `N` joints, and as a certificate writes them.
 
-use certune_certify::{AicGainValues, ProblemError};
+use certune_certify::{AicGainValues, MracGainValues, ProblemError};
 use certune_control::aic::AicGains;
-use certune_control::mrac::{self, MracGains};
-use certune_verify::{self as verify, Number};
+use certune_control::mrac::{MracGains, MracLaw};
+use certune_verify::{Gains, MracLaw as WrittenLaw};
 
 /// Gains of either controller.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +36,7 @@ impl<const N: usize> ArmGains<N> {
         }
     }
 
-    pub(super) fn written(&self) -> Result<verify::Gains, ProblemError> {
+    pub(crate) fn written(&self) -> Result<Gains, ProblemError> {
         match self {
             Self::Aic(gains) => {
                 let [kappa_mu, kappa_a, sigma_q, sigma_dq, sigma_mu, sigma_dmu, reference_time_constant_s] =
@@ -44,7 +44,27 @@ impl<const N: usize> ArmGains<N> {
                 AicGainValues { kappa_mu, kappa_a, sigma_q, sigma_dq, sigma_mu, sigma_dmu, reference_time_constant_s }
                     .written()
             }
-            Self::Mrac(gains) => mrac_written(gains),
+            Self::Mrac(gains) => {
+                let list = |values: &[f64; N]| values.to_vec();
+                let three = |rows: &[[f64; N]; 3]| rows.map(|row| row.to_vec());
+                MracGainValues {
+                    law: match gains.law {
+                        MracLaw::ReferenceModel => WrittenLaw::ReferenceModel,
+                        MracLaw::RawGoal => WrittenLaw::RawGoal,
+                        MracLaw::ReleasedCode => WrittenLaw::ReleasedCode,
+                    },
+                    omega_rad_per_s: list(&gains.omega_rad_per_s),
+                    zeta: list(&gains.zeta),
+                    l1: list(&gains.l1),
+                    l2: list(&gains.l2),
+                    alpha: three(&gains.alpha),
+                    e0: three(&gains.e0),
+                    e1: three(&gains.e1),
+                    f0: three(&gains.f0),
+                    f1: three(&gains.f1),
+                }
+                .written()
+            }
         }
     }
 }
@@ -64,30 +84,4 @@ fn aic_lists<const N: usize>(gains: &AicGains<N>) -> [&[f64; N]; 7] {
 fn mrac_lists<const N: usize>(gains: &MracGains<N>) -> Vec<&[f64; N]> {
     let MracGains { omega_rad_per_s, zeta, l1, l2, alpha, e0, e1, f0, f1, .. } = gains;
     [omega_rad_per_s, zeta, l1, l2].into_iter().chain([alpha, e0, e1, f0, f1].into_iter().flatten()).collect()
-}
-
-fn mrac_written<const N: usize>(gains: &MracGains<N>) -> Result<verify::Gains, ProblemError> {
-    let list = |quantity, values: &[f64; N]| {
-        let number = |&value| Number::decimal(value).ok_or(ProblemError::NotRepresentable { quantity, value });
-        values.iter().map(number).collect::<Result<Vec<_>, _>>()
-    };
-    let three = |quantity, [first, second, third]: &[[f64; N]; 3]| {
-        Ok::<_, ProblemError>([list(quantity, first)?, list(quantity, second)?, list(quantity, third)?])
-    };
-    Ok(verify::Gains::Mrac(verify::MracGains {
-        law: match gains.law {
-            mrac::MracLaw::ReferenceModel => verify::MracLaw::ReferenceModel,
-            mrac::MracLaw::RawGoal => verify::MracLaw::RawGoal,
-            mrac::MracLaw::ReleasedCode => verify::MracLaw::ReleasedCode,
-        },
-        omega_rad_per_s: list("omega_rad_per_s", &gains.omega_rad_per_s)?,
-        zeta: list("zeta", &gains.zeta)?,
-        l1: list("l1", &gains.l1)?,
-        l2: list("l2", &gains.l2)?,
-        alpha: three("alpha", &gains.alpha)?,
-        e0: three("e0", &gains.e0)?,
-        e1: three("e1", &gains.e1)?,
-        f0: three("f0", &gains.f0)?,
-        f1: three("f1", &gains.f1)?,
-    }))
 }

@@ -33,10 +33,10 @@ pub use gains::ArmGains;
 pub use growth::{Growth, growth};
 pub use objective::CertifiedObjective;
 pub use poles::poles_per_s;
-pub use request::{Effort, Request, TorqueLimits, claims_for};
+pub use request::{Answer, Effort, Request, TorqueLimits, claims_for};
 
 /// The controllers' own step, s. Continuous-time claims do not depend on it; parameters are validated with it.
-const STEP_S: f64 = 0.001;
+pub(crate) const STEP_S: f64 = 0.001;
 
 /// Why an arm, a family and gains make no certificate.
 #[derive(Debug, thiserror::Error)]
@@ -48,6 +48,12 @@ pub enum StabilityError {
     Delay {
         /// Largest delay of the box, samples.
         samples: usize,
+    },
+    /// A claim about one configuration was asked for, and no configuration given.
+    #[error("claims about an adaptive controller need a goal of {joints} joint positions")]
+    NoConfiguration {
+        /// Joints of the arm.
+        joints: usize,
     },
     /// Torque limits were asked for, and the robot's description has none for a joint.
     #[error("the robot's description states no torque limit for joint `{joint}`")]

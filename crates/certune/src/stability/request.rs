@@ -2,7 +2,7 @@
 
 use certune_bounds::SearchOptions;
 use certune_certify::Options;
-use certune_verify::ClaimKind;
+use certune_verify::{Certificate, ClaimKind, Record};
 
 use super::gains::ArmGains;
 
@@ -51,15 +51,28 @@ pub struct Request {
     pub delay_samples: usize,
     /// Torque limits, for the claims that can respect some.
     pub torque_limits: TorqueLimits,
+    /// The configuration of the claims that are about one, rad: the goal of an adaptive controller.
+    pub at_rad: Option<Vec<f64>>,
     /// How hard to search.
     pub effort: Effort,
+}
+
+/// What a certifier answers.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// The checked claims.
+    pub certificate: Certificate,
+    /// The records of proved constants that it rests on: whoever checks it needs them.
+    pub records: Vec<Record>,
 }
 
 /// The claims that apply to a controller with these gains, in the order in which they are examined.
 pub fn claims_for<const N: usize>(gains: &ArmGains<N>) -> Vec<ClaimKind> {
     match gains {
-        ArmGains::Aic(_) if gains.are_shared() => vec![ClaimKind::Exponential, ClaimKind::Region],
+        ArmGains::Aic(_) if gains.are_shared() => {
+            vec![ClaimKind::Exponential, ClaimKind::Region, ClaimKind::MovingGoal, ClaimKind::SampledRegion]
+        }
         ArmGains::Aic(_) => vec![ClaimKind::JointRegion],
-        ArmGains::Mrac(_) => vec![ClaimKind::AdaptiveConvergence, ClaimKind::PiExponential],
+        ArmGains::Mrac(_) => vec![ClaimKind::AdaptiveConvergence, ClaimKind::PiExponential, ClaimKind::AdaptiveSampled],
     }
 }
