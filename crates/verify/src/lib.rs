@@ -42,12 +42,7 @@ mod statement;
 
 pub use aic::{AicGains, Controller, STATES};
 pub use check::{Certificate, Checked, checked_alone, seal, verify};
-pub use check::{Certificate, Checked, seal, verify};
 pub use claims::*;
-pub use claims::*;
-pub use claims::*;
-pub use claims::*;
-pub use document::{Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade};
 pub use document::{
     Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade, InertiaEnclosure,
 };

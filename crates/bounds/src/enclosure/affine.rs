@@ -231,6 +231,10 @@ impl<const N: usize> Real for Affine<N> {
     fn tanh(self) -> Self {
         Self::from_interval(self.range().tanh())
     }
+
+    fn choose(self, bound: Self, then: Self, otherwise: Self) -> Self {
+        Self::from_interval(self.range().choose(bound.range(), then.range(), otherwise.range()))
+    }
 }
 
 #[cfg(test)]

@@ -214,6 +214,11 @@ impl Real for Interval {
         // Between 0 and the argument, and within [-1, 1]; the recursions used here take no tanh.
         Self::new(self.lower.clamp(-1.0, 0.0), self.upper.clamp(0.0, 1.0))
     }
+
+    fn choose(self, _: Self, then: Self, otherwise: Self) -> Self {
+        // Either may be taken.
+        Self::new(then.lower.min(otherwise.lower), then.upper.max(otherwise.upper))
+    }
 }
 
 #[cfg(test)]

@@ -35,7 +35,6 @@ pub use not_proved::{NotProvedClaim, Reason};
 pub use pi_exponential::{PiExponentialClaim, PiRefusedClaim, pi_inequalities};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
 pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
-pub use region::{RegionClaim, RegionWitness, region_inequalities};
 pub use sampled_motion::{Coordinates, Corner, Reach, SampledLoop, SampledUnknowns};
 pub use sampled_region::{
     Compensation, SampledRegionClaim, SampledRegionWitness, Sampling, sampled_loop, sampled_region_inequalities,
@@ -104,8 +103,6 @@ impl Claim {
                 Verdict::Refused
             }
             Self::NotProved(_) => Verdict::NotProved,
-            _ => Verdict::Holds,
-            _ => Verdict::Holds,
             _ => Verdict::Holds,
         }
     }

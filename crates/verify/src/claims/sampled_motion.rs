@@ -16,7 +16,7 @@ use num_rational::BigRational;
 use num_traits::{Signed, ToPrimitive};
 
 use super::sampled_region::Sampling;
-use crate::aic::{ControllerMatrices, STATES};
+use crate::aic::{Controller, STATES};
 use crate::document::Bounds;
 use crate::error::Flaw;
 use crate::form::{Field, Form, Row};
@@ -126,7 +126,7 @@ pub struct SampledUnknowns<T> {
 
 impl SampledLoop<BigRational> {
     pub(crate) fn new(
-        controller: &ControllerMatrices,
+        controller: &Controller<BigRational>,
         sampling: &Sampling,
         [rho, speed]: [BigRational; 2],
         [least_friction, largest_friction]: [BigRational; 2],
