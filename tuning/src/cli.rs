@@ -164,6 +164,9 @@ pub struct CertifyArgs {
     /// Configurations that the claims speak of [default: torus]
     #[arg(long, value_name = "torus|range|scenario", hide_possible_values = true)]
     pub over: Option<OverName>,
+    /// The goal of the claims about one configuration, rad, separated by commas [default: the scenario's first goal]
+    #[arg(long, value_name = "LIST", value_parser = numbers, allow_hyphen_values = true)]
+    pub at: Option<Numbers>,
     /// Claim it for every plant of this scenario's plant box, instead of the five options below
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["gravity_compensation", "friction", "payload", "mass_uncertainty", "rotor_inertia"])]
     pub scenario: Option<String>,

@@ -5,8 +5,7 @@
 
 use certune_bounds::enclosure;
 use certune_certify::{
-    CertifyError, EnclosureValues, Problem, adaptive_convergence, adaptive_sampled, pi_exponential,
-    to_json,
+    CertifyError, EnclosureValues, Problem, adaptive_convergence, adaptive_sampled, pi_exponential, to_json,
 };
 use certune_control::mrac::{MracGains, MracParams};
 use certune_verify::{Certificate, Claim, ClaimKind, seal, verify};

@@ -1,9 +1,10 @@
 //! `autotune certify`: claims about given gains on a family of plants.
 
+use certune::certify::GoalListValues;
 use certune::closed_loop::{Gains, PlantBox, Scenario};
 use certune::dynamics::{Link, Robot, for_joint_count};
 use certune::verify::{Certificate, Evidence, Record};
-use certune::{ArmCertifier, ArmGains, Growth, Over, Request, certificate_text, family_of};
+use certune::{Answer, ArmCertifier, ArmGains, Growth, Over, Request, certificate_text, family_of};
 use serde::Serialize;
 
 use super::claims::{AssumptionSummary, ClaimSummary, claims_in_words, growths, summaries};
@@ -13,6 +14,7 @@ use crate::cli::{CertifyArgs, Context, Exit, OverName, Switch};
 use crate::error::Error;
 use crate::output;
 use crate::progress::Terminal;
+use crate::values::Numbers;
 
 /// The controller's step, s: that of the sampled claims and of the check of the gains.
 const STEP_S: f64 = 1e-3;
@@ -48,12 +50,18 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
         None => (plant_box(args, &robot), None),
     };
     let over = over(args, &robot)?;
-    let (certificate, growth) = for_joint_count!(robot.joints(), N => {
+    let Certified { certificate, growth, unknown_records } = for_joint_count!(robot.joints(), N => {
         certificate::<N>(args, &robot, &gains, &plant_box, (&records, &over), context)
     })
     .unwrap_or_else(|| Err(catalogue::too_many_joints(&robot)))?;
+    let mut companions = Vec::new();
     if let Some(path) = &args.out {
         output::write_file(path, &certificate_text(&certificate)?)?;
+        for record in &unknown_records {
+            let beside = path.with_extension("constants.json");
+            output::write_file(&beside, &(serde_json::to_string_pretty(record)? + "\n"))?;
+            companions.push(beside);
+        }
     }
     if context.json {
         output::print_json(&Summary {
@@ -76,7 +84,9 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
             text.push_str(&output::wrapped(&note, 0));
         }
         if let Some(path) = &args.out {
-            text.push_str(&format!("written to {}; check it with `autotune verify {0}`\n", path.display()));
+            let constants =
+                companions.iter().map(|path| format!(" --constants {}", path.display())).collect::<String>();
+            text.push_str(&format!("written to {}; check it with `autotune verify {0}{constants}`\n", path.display()));
         }
         output::print(&text)?;
     }
@@ -101,6 +111,35 @@ fn plant_box(args: &CertifyArgs, robot: &Robot) -> PlantBox {
         delay_samples: [0; 2],
         gravity_compensation: args.gravity_compensation == Some(Switch::On),
     }
+}
+
+/// What a certificate took, and what goes with it.
+struct Certified {
+    certificate: Certificate,
+    growth: Vec<Option<Growth>>,
+    /// Records made for this certificate: they must be kept with it.
+    unknown_records: Vec<Record>,
+}
+
+/// The goal of claims about one configuration; only an adaptive controller has such claims.
+fn at<const N: usize>(args: &CertifyArgs, robot: &Robot, gains: &ArmGains<N>) -> Result<Option<Vec<f64>>, Error> {
+    match (&args.at, gains) {
+        (Some(Numbers(found)), _) if found.len() != N => {
+            Err(Error::ListLength { flag: "--at", found: found.len(), robot: robot.name().to_owned(), joints: N })
+        }
+        (Some(Numbers(at)), _) => Ok(Some(at.clone())),
+        (None, ArmGains::Aic(_)) => Ok(None),
+        (None, ArmGains::Mrac(_)) => {
+            let scenario = catalogue::scenario(args.scenario.as_deref(), robot)?;
+            Ok(scenario.segments.first().map(|segment| segment.goal_rad.clone()))
+        }
+    }
+}
+
+/// The goals of a scenario, one after the other.
+fn goals(scenario: Scenario) -> GoalListValues {
+    let goals = scenario.segments.into_iter().map(|segment| (segment.goal_rad, segment.duration_s)).collect();
+    GoalListValues { start_rad: scenario.start_rad, goals }
 }
 
 /// The configurations that the options speak of.
@@ -133,7 +172,7 @@ fn certificate<const N: usize>(
     plant_box: &PlantBox,
     (records, over): (&[Record], &Over),
     context: Context,
-) -> Result<(Certificate, Vec<Option<Growth>>), Error> {
+) -> Result<Certified, Error> {
     let gains: ArmGains<N> = match &source.gains.gains {
         Gains::Aic(table) => source.aic_gains::<N>(table, STEP_S)?.into(),
         Gains::Mrac(table) => (*source.mrac_params::<N>(table, STEP_S)?.gains()).into(),
@@ -142,6 +181,13 @@ fn certificate<const N: usize>(
         claims: args.claims.clone(),
         delay_samples: args.delay.unwrap_or(plant_box.delay_samples[1]),
         torque_limits: args.torque_limits.unwrap_or_default(),
+        at_rad: at(args, robot, &gains)?,
+        goals: args
+            .scenario
+            .is_some()
+            .then(|| catalogue::scenario(args.scenario.as_deref(), robot))
+            .transpose()?
+            .map(goals),
         ..Request::default()
     };
     let progress = Terminal::new(context.verbose);
@@ -164,10 +210,16 @@ fn certificate<const N: usize>(
         }
     }
     progress.begin("searching for proofs");
-    let answer = certifier.answer(&gains, &request).map_err(Error::from).and_then(|certificate| {
-        let growth = growths::<N>(robot, &certificate)?;
-        Ok((certificate, growth))
-    });
+    let answer =
+        certifier.answer(&gains, &request).map_err(Error::from).and_then(|Answer { certificate, records: used }| {
+            let growth = growths::<N>(robot, &certificate)?;
+            let known = |record: &Record| records.iter().any(|known| known.sha256 == record.sha256);
+            Ok(Certified {
+                certificate,
+                growth,
+                unknown_records: used.into_iter().filter(|record| !known(record)).collect(),
+            })
+        });
     progress.finish();
     answer
 }

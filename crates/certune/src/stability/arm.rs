@@ -6,7 +6,7 @@ use certune_bounds::{ArmBox, BoundsError, Ranges, SampledConstants, SamplingOpti
 use certune_certify::{ArmValues, ConstantValues, FamilyValues, Options, Problem, arm_ranges, certify};
 use certune_control::aic::{AicGains, AicParams};
 use certune_dynamics::{Model, Payload, Robot};
-use certune_verify::{Arm, Certificate, ClaimKind, Gains, Record};
+use certune_verify::{Arm, Certificate, ClaimKind, Gains, Number, Record};
 
 use crate::adaptive::AdaptiveSetting;
 
@@ -113,10 +113,8 @@ impl<const N: usize> ArmCertifier<N> {
         claims: &[ClaimKind],
         effort: &Effort,
     ) -> Result<Certificate, StabilityError> {
-        self.answer(
-            &(*gains).into(),
-            &Request { claims: claims.to_vec(), effort: effort.clone(), ..Request::default() },
-        )
+        let request = Request { claims: claims.to_vec(), effort: effort.clone(), ..Request::default() };
+        Ok(self.answer(&(*gains).into(), &request)?.certificate)
     }
 
     /// Makes the claims that are asked for about a controller and has them checked.
@@ -148,11 +146,22 @@ impl<const N: usize> ArmCertifier<N> {
     /// The search as the request wants it.
     fn options(&self, request: &Request) -> Result<Options, StabilityError> {
         let mut options = request.effort.proofs.clone();
+        options.sampled_region.step_s = STEP_S;
+        options.sampled_region.delay_samples = request.delay_samples;
         match request.torque_limits {
             TorqueLimits::None => {}
-            TorqueLimits::Norm(limit) => options.region.controller_torque_n_m = Some(limit),
-            TorqueLimits::LessGravity => options.region.motor_limits_n_m = Some(self.motor_limits_n_m()?),
+            TorqueLimits::Norm(limit) => {
+                options.region.controller_torque_n_m = Some(limit);
+                options.sampled_region.torque_limit_n_m = Some(limit);
+            }
+            TorqueLimits::LessGravity => {
+                let limits = self.motor_limits_n_m()?;
+                options.sampled_region.torque_limit_n_m = self.left_by_gravity(&limits);
+                options.region.motor_limits_n_m = Some(limits);
+            }
         }
+        options.moving_goal.region = options.region.clone();
+        options.moving_goal.list.clone_from(&request.goals);
         Ok(options)
     }
 
@@ -163,5 +172,14 @@ impl<const N: usize> ArmCertifier<N> {
             Some(joint) => Err(StabilityError::NoTorqueLimit { joint: self.robot.links()[joint].joint_name.clone() }),
             None => Ok(limits),
         }
+    }
+
+    /// What gravity leaves to the controller at the weakest joint, N m; `None` when the constants say nothing about gravity.
+    fn left_by_gravity(&self, limits_n_m: &[f64]) -> Option<f64> {
+        let gravity: Vec<f64> = match &self.record {
+            Some(record) => record.bounds.gravity_torque_n_m.as_ref()?.iter().map(Number::to_f64).collect(),
+            None => self.constants().gravity_torque_n_m.clone(),
+        };
+        limits_n_m.iter().zip(gravity).map(|(limit, gravity)| limit - gravity).reduce(f64::min)
     }
 }

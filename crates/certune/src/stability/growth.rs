@@ -72,6 +72,7 @@ pub fn growth<const N: usize>(
         start: goal + direction * START_RAD,
         segments: vec![TaskSegment { goal, steps }],
         torque_limits: false,
+        goal_limiter: None,
         integrator: Integrator { method: Method::RungeKutta4, substeps: 1 },
         noise: Noise::default(),
         payloads: Vec::new(),

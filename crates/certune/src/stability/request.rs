@@ -1,7 +1,7 @@
 //! What is asked of a certifier.
 
 use certune_bounds::SearchOptions;
-use certune_certify::Options;
+use certune_certify::{GoalListValues, Options};
 use certune_verify::{Certificate, ClaimKind, Record};
 
 use super::gains::ArmGains;
@@ -53,6 +53,8 @@ pub struct Request {
     pub torque_limits: TorqueLimits,
     /// The configuration of the claims that are about one, rad: the goal of an adaptive controller.
     pub at_rad: Option<Vec<f64>>,
+    /// Goals that follow each other, for `moving-goal`; without any it speaks of goals in general.
+    pub goals: Option<GoalListValues>,
     /// How hard to search.
     pub effort: Effort,
 }
