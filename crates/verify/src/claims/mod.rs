@@ -147,6 +147,21 @@ pub enum ClaimKind {
 }
 
 impl ClaimKind {
+    /// Every kind.
+    pub const ALL: [Self; 11] = [
+        Self::Exponential,
+        Self::Sampled,
+        Self::Region,
+        Self::JointRegion,
+        Self::SampledRegion,
+        Self::MovingGoal,
+        Self::Disturbance,
+        Self::Lyapunov,
+        Self::AdaptiveConvergence,
+        Self::PiExponential,
+        Self::AdaptiveSampled,
+    ];
+
     /// The name as it is written in files and flags.
     pub fn name(self) -> &'static str {
         match self {
