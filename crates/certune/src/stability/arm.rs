@@ -107,7 +107,7 @@ impl<const N: usize> ArmCertifier<N> {
     /// Sampled diagonals, for gains that differ between joints: no other claim looks at them.
     fn diagonals(&self, gains: &Gains) -> Option<[Vec<f64>; 2]> {
         let wanted = gains.aic().is_ok_and(|gains| gains.shared_by_all().is_err());
-        let found = || sampled_diagonals(&self.members, self.constants().margin);
+        let found = || sampled_diagonals(&self.members, self.constants());
         if wanted { self.diagonals.get_or_init(found).clone() } else { None }
     }
 

@@ -78,7 +78,11 @@ fn holds(outer: &ConfigurationSet, inner: &ConfigurationSet) -> bool {
 
 /// `diag(lower) <= M <= diag(upper)` over the members, sampled: the shape from the largest diagonal entries of M and of its inverse, the size
 /// from the extreme eigenvalues of M seen in that shape, widened by the margin.
-pub(super) fn sampled_diagonals<const N: usize>(members: &ArmBox<N>, margin: f64) -> Option<[Vec<f64>; 2]> {
+pub(super) fn sampled_diagonals<const N: usize>(
+    members: &ArmBox<N>,
+    found: &SampledConstants,
+) -> Option<[Vec<f64>; 2]> {
+    let margin = found.margin;
     let angles = &members.axes()[..N];
     let ends = |end: usize| members.groups().iter().map(|group| group.scale[end]).collect::<Vec<f64>>();
     let [rotor_lower, rotor_upper] = members.rotor_inertia_kg_m2();
@@ -86,8 +90,12 @@ pub(super) fn sampled_diagonals<const N: usize>(members: &ArmBox<N>, margin: f64
     let heaviest = members.model(&ends(1), &rotor_upper).ok()?;
     let inertia = |model: &Model<N>, at: &[f64]| mass_matrix(model, &Joints::from_column_slice(at));
     let inverse = |at: &[f64]| inertia(&lightest, at).try_inverse();
-    let options =
-        SearchOptions { samples: 20_000, local_starts: 8, evaluations_per_start: 500, ..SearchOptions::default() };
+    let options = SearchOptions {
+        samples: found.samples,
+        local_starts: found.local_starts,
+        evaluations_per_start: 300,
+        ..SearchOptions::default()
+    };
     let largest = |score: &(dyn Fn(&[f64]) -> f64 + Sync)| maximise(angles, &options, score).ok().map(|top| top.value);
     // The eigenvalues of S M S, S = diag(scale).
     let largest_seen = |matrix: JointMatrix<N>, scale: &[f64]| {
