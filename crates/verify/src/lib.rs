@@ -14,6 +14,7 @@
 //! | `form` | quadratic forms assembled from linear ones |
 //! | `aic`, `gains` | the controllers' gains, and the AIC's matrices |
 //! | `normed` | what a claim may rest on when an earlier one proves a region |
+//! | `mrac` | what the proofs about the adaptive controller need of its gains |
 //! | `claims` | one file for each kind of claim: what it states, its words, its proof |
 //! | `document` | the file |
 //! | `record` | proved constants of an arm, referred to by their hash |
@@ -31,6 +32,7 @@ mod document;
 mod error;
 mod form;
 mod gains;
+mod mrac;
 mod normed;
 mod number;
 mod outward;
@@ -39,15 +41,11 @@ mod record;
 mod statement;
 
 pub use aic::{AicGains, Controller, STATES};
-pub use check::{Certificate, Checked, seal, verify};
-pub use claims::{
-    Attained, BoxPoint, Claim, ClaimKind, CoveredSteps, DisturbanceClaim, DisturbanceWitness, DisturbedArm, Energy,
-    ExponentialClaim, Figure, GoalList, Inequality, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights,
-    ListedGoal, LoopBox, LoopFamily, MovingGoalClaim, NotProvedClaim, Plant, Point, Reason, RefusedClaim, RegionClaim,
-    RegionProblem, RegionWitness, State, TRIANGLE, Verdict, disturbance_inequalities, family_box,
-    joint_region_inequalities, moving_goal_inequalities, region_inequalities, triangle,
+pub use check::{Certificate, Checked, checked_alone, seal, verify};
+pub use claims::*;
+pub use document::{
+    Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade, InertiaEnclosure,
 };
-pub use document::{Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade};
 pub use error::{Flaw, Rejection, VerifyError};
 pub use form::{Field, Form, Row};
 pub use gains::{Gains, MracGains, MracLaw};

@@ -205,7 +205,11 @@ impl RegionClaim {
     }
 
     /// The witness as numbers, once the claim's own are what the proof allows.
-    fn checked(&self, document: &Document, problem: &RegionProblem<BigRational>) -> Result<Point<BigRational>, Flaw> {
+    pub(crate) fn checked(
+        &self,
+        document: &Document,
+        problem: &RegionProblem<BigRational>,
+    ) -> Result<Point<BigRational>, Flaw> {
         require_positive("radius_rad", &self.radius_rad)?;
         require_positive("rate_per_s", &self.rate_per_s)?;
         for (name, number) in
