@@ -2,10 +2,6 @@
 //!
 //! The nonlinear continuous-time loop is integrated (Runge and Kutta) on the Panda; at every step the goal moves, or the noise points, in the
 //! direction in which V grows fastest.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
-
-#[path = "soundness/continuous.rs"]
-mod continuous;
 
 use std::path::Path;
 
@@ -16,9 +12,11 @@ use certune::dynamics::{Model, Robot, mass_matrix};
 use certune::linsys::Joints;
 use certune::verify::{Certificate, Claim, ClaimKind, Number, RegionClaim, RegionWitness, triangle};
 use certune::{ArmCertifier, Effort};
-use continuous::{Continuous, Loop};
 use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{RngCore, SeedableRng};
+use rand_chacha::rand_core::RngCore;
+
+use crate::chance::{stream, uniform};
+use crate::continuous::{Continuous, Loop};
 
 const N: usize = 7;
 const STEP_S: f64 = 1e-3;
@@ -53,10 +51,6 @@ fn certificate(kappa_a: f64, claim: ClaimKind, proofs: Options) -> Certificate {
     let certifier = ArmCertifier::<N>::new(&Robot::panda(), &family).unwrap();
     let effort = Effort { proofs, ..Effort::default() };
     certifier.certify_with(&gains(kappa_a), &[claim], &effort).unwrap()
-}
-
-fn uniform(rng: &mut ChaCha8Rng, lower: f64, upper: f64) -> f64 {
-    lower + (upper - lower) * ((rng.next_u64() >> 11) as f64 * 2.0_f64.powi(-53))
 }
 
 /// The Panda, each joint's friction at one of its ends.
@@ -103,7 +97,7 @@ fn no_goal_at_the_certified_speed_takes_the_state_out_of_the_region() {
     let speed = claim.goal_speed_rad_per_s.to_f64();
     let jump = claim.jump_rad.to_f64();
     let dwell_steps = (claim.dwell_s.to_f64() / STEP_S).round() as usize;
-    let mut rng = ChaCha8Rng::seed_from_u64(0xCE27);
+    let mut rng = stream(0xCE27, 0);
     let mut worst = [0.0_f64; 2];
     for attack in 0..8 {
         let q = Joints::from_fn(|_, _| uniform(&mut rng, -3.0, 3.0));
@@ -246,7 +240,7 @@ fn no_disturbance_within_its_bounds_exceeds_the_certified_error() {
         DisturbanceOptions { position_noise_rad: 0.0, velocity_noise_rad_per_s: 0.0, push_n_m: 5.0, ..noise },
     ];
     let params = AicParams::new(&gains(700.0), STEP_S).unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(0xCE27);
+    let mut rng = stream(0xCE27, 0);
     for options in cases {
         let certificate =
             certificate(700.0, ClaimKind::Disturbance, Options { disturbance: options, ..Default::default() });
@@ -276,7 +270,7 @@ fn no_disturbance_within_its_bounds_exceeds_the_certified_error() {
         };
         let bounds = [options.position_noise_rad, options.velocity_noise_rad_per_s, options.torque_n_m];
         let (mut worst, mut worst_end) = (0.0_f64, 0.0_f64);
-        for _ in 0..4 {
+        for _ in 0..2 {
             let goal = Joints::from_fn(|_, _| uniform(&mut rng, -3.0, 3.0));
             let mut random = || Joints::<N>::from_fn(|_, _| uniform(&mut rng, -1.0, 1.0));
             let (away, push) = (along(random(), options.radius_rad), along(random(), options.push_n_m));
@@ -286,7 +280,7 @@ fn no_disturbance_within_its_bounds_exceeds_the_certified_error() {
             x.beliefs = [x.q + first_q, first_v, Joints::zeros()];
             // With the push the equilibrium torque is its opposite: u~ is the push itself.
             x.u = push;
-            let (steps, last) = (30_000, 29_000);
+            let (steps, last) = (20_000, 19_000);
             for step in 0..steps {
                 let acting = worst_disturbances(&arm, &region.witness, bounds, &x);
                 let (v, error) = (arm.v(&region, &x), (x.q - goal).norm());
