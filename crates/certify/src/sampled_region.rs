@@ -216,7 +216,12 @@ impl Candidate {
         let mean = motion.remainder().recip();
         let span = motion.friction()[1].max(1e-3).powi(-2);
         let mut four = || {
-            [multiplier(true, mean), multiplier(true, mean), multiplier(has_friction, span), multiplier(has_friction, span)]
+            [
+                multiplier(true, mean),
+                multiplier(true, mean),
+                multiplier(has_friction, span),
+                multiplier(has_friction, span),
+            ]
         };
         let (decay, containment) = (four(), four());
         let growth = [multiplier(true, mean), multiplier(has_friction, span)];
@@ -312,7 +317,7 @@ impl Candidate {
             }
         }
         blocks.push(Box::new(|x| DMatrix::from_element(1, 1, self.unknowns(x).theta)));
-        let t0=std::time::Instant::now(); let r = Program { cost, nonnegative, blocks }.solve(); println!("{:?} {strictness} {:?} {:?}", self.bounds, t0.elapsed(), r.as_ref().map(|s| (s.accurate, self.unknowns(&s.x).s[0][0]))); let x = r.ok()?.x;
+        let x = Program { cost, nonnegative, blocks }.solve().ok()?.x;
         let found = Found { x: self.unknowns(&x), bounds: self.bounds, points: self.points.clone() };
         (found.start() > 0.0).then_some(found)
     }

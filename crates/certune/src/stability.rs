@@ -12,13 +12,13 @@ use certune_control::ParamError;
 use certune_control::aic::{AicGains, AicParams};
 use certune_dynamics::{Model, Payload, Robot, RobotError, gravity_jacobian, mass_matrix};
 use certune_linsys::{Continuous, Joints, Loop, LoopError};
-use certune_verify::{Attained, Certificate, ClaimKind, Number};
+use certune_verify::{Attained, Certificate, ClaimKind, Gains, Number};
 use nalgebra::{Complex, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
 /// The controllers' own step, s. Continuous-time claims do not depend on it; parameters are validated with it.
-const STEP_S: f64 = 0.001;
+pub(crate) const STEP_S: f64 = 0.001;
 
 /// Why an arm, a family and gains make no certificate.
 #[derive(Debug, thiserror::Error)]
@@ -73,7 +73,7 @@ pub fn family_of(plant_box: &PlantBox) -> Result<FamilyValues, StabilityError> {
 }
 
 /// How hard a certificate is searched.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Effort {
     /// The search for proofs.
     pub proofs: Options,
@@ -161,9 +161,19 @@ impl<const N: usize> ArmCertifier<N> {
         effort: &Effort,
     ) -> Result<Certificate, StabilityError> {
         let params = AicParams::new(gains, STEP_S)?;
-        let problem = Problem::new(&self.arm, gain_values(gains).written()?, &self.family, &self.constant_values())?;
+        let problem = self.problem(gain_values(gains).written()?)?;
         let attain = || self.unstable_member(&params, &effort.counterexample).ok().flatten();
         Ok(certify(&problem, claims, &effort.proofs, &attain)?)
+    }
+
+    /// The problem of these gains, without claims.
+    pub(crate) fn problem(&self, gains: Gains) -> Result<Problem, StabilityError> {
+        Ok(Problem::new(&self.arm, gains, &self.family, &self.constant_values())?)
+    }
+
+    /// The box of arms.
+    pub(crate) fn members(&self) -> &ArmBox<N> {
+        &self.members
     }
 
     fn constant_values(&self) -> ConstantValues {

@@ -52,7 +52,7 @@ pub fn attack<const N: usize>(
             Claim::Exponential(claim) => exponential(subject, claim, &params, rng, &mut tally),
             Claim::Region(claim) => region(subject, claim, &params, rng, &mut tally),
             Claim::Refused(claim) => refused(subject, claim, &params, &mut tally),
-            Claim::NotProved(_) => {}
+            _ => {}
         }
     }
     tally

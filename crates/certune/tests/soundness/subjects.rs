@@ -25,7 +25,10 @@ pub struct Subject<const N: usize> {
 /// Less effort finds smaller regions and fewer attainable points; what it claims must be as true.
 pub fn effort() -> Effort {
     Effort {
-        proofs: Options { region: RegionOptions { coarse: 4, refinements: 0, ..RegionOptions::default() } },
+        proofs: Options {
+            region: RegionOptions { coarse: 4, refinements: 0, ..RegionOptions::default() },
+            ..Options::default()
+        },
         counterexample: SearchOptions { samples: 64, local_starts: 0, enough: 0.0, ..SearchOptions::default() },
     }
 }
