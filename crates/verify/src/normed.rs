@@ -6,7 +6,7 @@
 
 use num_rational::BigRational;
 
-use crate::claims::{Claim, Inequality, RegionClaim, RegionProblem, State};
+use crate::claims::{Claim, Inequality, JointRegionClaim, RegionClaim, RegionProblem, State};
 use crate::document::{ConfigurationSet, Document};
 use crate::error::Flaw;
 
@@ -42,6 +42,7 @@ pub(crate) fn region_before(document: &Document, position: usize, index: usize) 
     let earlier = document.claims.get(..position).unwrap_or_default();
     match index.checked_sub(1).and_then(|index| earlier.get(index)).map(|entry| &entry.claim) {
         Some(Claim::Region(claim)) => Ok(claim.as_ref()),
+        Some(Claim::JointRegion(claim)) => Ok(claim.as_ref()),
         _ => Err(none()),
     }
 }
@@ -76,5 +77,29 @@ impl Normed for RegionClaim {
                 Inequality::decide(format!("distance at the {end} inertia"), &form.0)
             })
             .collect())
+    }
+}
+
+impl Normed for JointRegionClaim {
+    fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
+        require_norm(document)?;
+        let shift_weights = self.start_weights(document)?;
+        Ok(Norm { shift_weights, rate: self.rate_per_s.value().clone(), period: None })
+    }
+
+    fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
+        // V is at least a sum over joints, so the same bound in each joint bounds the 2-norm.
+        let inverse_square = (most * most).recip();
+        let mut all = Vec::new();
+        for joint in self.joints(document)? {
+            for (end, point) in joint.points() {
+                let form = joint.problem.within(point, State::Position, &inverse_square);
+                all.push(Inequality::decide(
+                    format!("distance of joint {} at the {end} friction", joint.index),
+                    &form.0,
+                ));
+            }
+        }
+        Ok(all)
     }
 }
