@@ -9,6 +9,8 @@
 //! | `problem` | gains, family and constants of an arm as a document without claims |
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
+//! | `disturbance` | least bound on the error under noise and pushes |
+//! | `digits` | figures rounded to the safe side |
 //! | `joint_region` | the same, an ellipsoid, with gains, frictions and limits of each joint |
 //! | `moving_goal` | the fastest goal that a region allows |
 //! | `sampled_region` | the same of the sampled nonlinear loop |
@@ -19,6 +21,8 @@
 #![forbid(unsafe_code)]
 
 mod adaptive;
+mod digits;
+mod disturbance;
 mod exponential;
 mod joint_region;
 mod lmi;
@@ -28,10 +32,11 @@ mod region;
 mod sampled_region;
 
 pub use adaptive::{adaptive_convergence, adaptive_sampled, pi_exponential};
+pub use disturbance::{DisturbanceOptions, disturbance};
 pub use exponential::{UnstableLoop, exponential};
 pub use joint_region::{JointRegionOptions, joint_region};
 pub use lmi::{Affine, Program, Solution, SolveError};
-pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal};
+pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal, moving_goal_on};
 pub use problem::{
     AicGainValues, ArmValues, ConstantValues, EnclosureValues, FamilyValues, MracGainValues, Problem, ProblemError,
     SampledConstantValues, arm_ranges,
@@ -68,6 +73,8 @@ pub struct Options {
     pub moving_goal: MovingGoalOptions,
     /// The region of the sampled nonlinear loop.
     pub sampled_region: SampledRegionOptions,
+    /// The error under noise and pushes.
+    pub disturbance: DisturbanceOptions,
 }
 
 /// Makes the claims about a problem, in the order asked for, and has them checked.
@@ -91,6 +98,7 @@ pub fn certify(
             ClaimKind::JointRegion => vec![joint_region(problem, &options.joint_region)],
             ClaimKind::MovingGoal => moving_goal(problem, &document, &options.moving_goal),
             ClaimKind::SampledRegion => vec![sampled_region(problem, &options.sampled_region)],
+            ClaimKind::Disturbance => vec![disturbance(problem, &options.disturbance)],
             other => vec![not_proved(*other, Reason::FamilyNotCovered, None)],
         };
         document.claims.extend(made.into_iter().map(Into::into));

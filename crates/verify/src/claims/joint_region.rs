@@ -37,6 +37,7 @@ use crate::aic::STATES;
 use crate::document::Document;
 use crate::error::Flaw;
 use crate::form::{Field, Form, Row};
+use crate::normed::{Norm, Normed};
 use crate::number::{Number, unit_interval};
 use crate::quantity::{require, require_length, require_plain, require_positive};
 use crate::statement::list;
@@ -208,16 +209,16 @@ pub fn joint_region_inequalities(document: &Document, claim: &JointRegionClaim) 
 }
 
 /// One joint of a claim, with the witness as numbers at each end of its friction.
-pub(crate) struct ClaimedJoint {
+struct ClaimedJoint {
     /// Counted from 1.
-    pub(crate) index: usize,
-    pub(crate) problem: JointProblem<BigRational>,
+    index: usize,
+    problem: JointProblem<BigRational>,
     points: Vec<Point<BigRational>>,
 }
 
 impl ClaimedJoint {
     /// The ends of the friction, named.
-    pub(crate) fn points(&self) -> impl Iterator<Item = (&'static str, &Point<BigRational>)> {
+    fn points(&self) -> impl Iterator<Item = (&'static str, &Point<BigRational>)> {
         ["least", "largest"].into_iter().zip(&self.points)
     }
 }
@@ -236,7 +237,7 @@ impl JointRegionClaim {
     }
 
     /// Every joint with its witness, once the claim's own numbers are what the proof allows.
-    pub(crate) fn joints(&self, document: &Document) -> Result<Vec<ClaimedJoint>, Flaw> {
+    fn joints(&self, document: &Document) -> Result<Vec<ClaimedJoint>, Flaw> {
         self.check(document)?;
         let claimed = |(index, JointWeights { b, s }): (usize, &JointWeights)| {
             let problem = JointProblem::new(document, index)?;
@@ -308,6 +309,31 @@ impl JointRegionClaim {
             gravity_multiplier: gravity_multiplier.value().clone(),
             start_multiplier: start_multiplier.value().clone(),
         })
+    }
+}
+
+impl Normed for JointRegionClaim {
+    fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
+        Ok(Norm {
+            shift_weights: self.start_weights(document)?,
+            rate: self.rate_per_s.value().clone(),
+            period: None,
+            kept: self.distances_rad.clone(),
+        })
+    }
+
+    fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
+        // V is at least a sum over joints, so the same bound in each joint bounds the 2-norm.
+        let closeness = (most * most).recip();
+        let mut all = Vec::new();
+        for joint in self.joints(document)? {
+            for (end, point) in joint.points() {
+                let form = joint.problem.within(point, State::Position, &closeness);
+                let name = format!("distance of joint {} at the {end} friction", joint.index);
+                all.push(Inequality::decide(name, &form.0));
+            }
+        }
+        Ok(all)
     }
 }
 
