@@ -1,7 +1,7 @@
 //! `autotune certify`: claims about given gains on a family of plants.
 
 use certune::certify::GoalListValues;
-use certune::closed_loop::{Gains, PlantBox, Scenario};
+use certune::closed_loop::{Gains, LawName, PlantBox, Scenario};
 use certune::dynamics::{Link, Robot, for_joint_count};
 use certune::verify::{Certificate, Evidence, Record};
 use certune::{Answer, ArmCertifier, ArmGains, Growth, Over, Request, certificate_text, family_of};
@@ -80,6 +80,9 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
         })?;
     } else {
         let mut text = claims_in_words(&certificate, &growth, context.verbose);
+        if let Some(note) = released_code(&gains) {
+            text.push_str(&output::wrapped(note, 0));
+        }
         if let Some(note) = beyond {
             text.push_str(&output::wrapped(&note, 0));
         }
@@ -119,6 +122,17 @@ struct Certified {
     growth: Vec<Option<Growth>>,
     /// Records made for this certificate: they must be kept with it.
     unknown_records: Vec<Record>,
+}
+
+/// What else could be asked about gains whose law no claim covers.
+fn released_code(gains: &GainsSource) -> Option<&'static str> {
+    match &gains.gains.gains {
+        Gains::Mrac(table) if table.law == LawName::ReleasedCode => Some(
+            "Note: the same gains under the paper's equations are another controller, which claims do cover: a gains file with law = \
+             \"reference-model\" or \"raw-goal\".",
+        ),
+        Gains::Mrac(_) | Gains::Aic(_) => None,
+    }
 }
 
 /// The goal of claims about one configuration; only an adaptive controller has such claims.

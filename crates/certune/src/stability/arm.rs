@@ -3,14 +3,14 @@
 use std::sync::OnceLock;
 
 use certune_bounds::{ArmBox, BoundsError, Ranges, SampledConstants, SamplingOptions, sampled_constants};
-use certune_certify::{ArmValues, ConstantValues, FamilyValues, Options, Problem, arm_ranges, certify};
+use certune_certify::{ArmValues, ConstantValues, FamilyValues, GoalListValues, Options, Problem, arm_ranges, certify};
 use certune_control::aic::{AicGains, AicParams};
 use certune_dynamics::{Model, Payload, Robot};
 use certune_verify::{Arm, Certificate, ClaimKind, Gains, Number, Record};
 
 use crate::adaptive::AdaptiveSetting;
 
-use super::constants::{Over, best_record, sampled_values};
+use super::constants::{Over, best_record, sampled_diagonals, sampled_values};
 use super::gains::ArmGains;
 use super::request::{Answer, Effort, Request, TorqueLimits, claims_for};
 use super::{STEP_S, StabilityError};
@@ -27,6 +27,7 @@ pub struct ArmCertifier<const N: usize> {
     pub(super) members: ArmBox<N>,
     record: Option<Record>,
     sampled: OnceLock<SampledConstants>,
+    diagonals: OnceLock<Option<[Vec<f64>; 2]>>,
 }
 
 impl<const N: usize> ArmCertifier<N> {
@@ -52,7 +53,15 @@ impl<const N: usize> ArmCertifier<N> {
             sha256: robot.sha256(),
             payload_com_m: ranges.payload_com_m,
         };
-        Ok(Self { robot: robot.clone(), arm, family: family.clone(), members, record: None, sampled: OnceLock::new() })
+        Ok(Self {
+            robot: robot.clone(),
+            arm,
+            family: family.clone(),
+            members,
+            record: None,
+            sampled: OnceLock::new(),
+            diagonals: OnceLock::new(),
+        })
     }
 
     /// The same arms with the constants of the best of the records that covers them over the set, if one does.
@@ -90,9 +99,16 @@ impl<const N: usize> ArmCertifier<N> {
     pub(crate) fn problem(&self, gains: Gains) -> Result<Problem, StabilityError> {
         let constants = match &self.record {
             Some(record) => ConstantValues::Proved(Box::new(record.clone())),
-            None => sampled_values(self.constants()),
+            None => sampled_values(self.constants(), self.diagonals(&gains)),
         };
         Ok(Problem::new(&self.arm, gains, &self.family, &constants)?)
+    }
+
+    /// Sampled diagonals, for gains that differ between joints: no other claim looks at them.
+    fn diagonals(&self, gains: &Gains) -> Option<[Vec<f64>; 2]> {
+        let wanted = gains.aic().is_ok_and(|gains| gains.shared_by_all().is_err());
+        let found = || sampled_diagonals(&self.members, self.constants());
+        if wanted { self.diagonals.get_or_init(found).clone() } else { None }
     }
 
     /// Makes the claims about an AIC and has them checked. Whether they hold is for the certificate to say.
@@ -157,11 +173,13 @@ impl<const N: usize> ArmCertifier<N> {
             TorqueLimits::LessGravity => {
                 let limits = self.motor_limits_n_m()?;
                 options.sampled_region.torque_limit_n_m = self.left_by_gravity(&limits);
+                options.joint_region.motor_limits_n_m = Some(limits.clone());
                 options.region.motor_limits_n_m = Some(limits);
             }
         }
         options.moving_goal.region = options.region.clone();
         options.moving_goal.list.clone_from(&request.goals);
+        options.joint_region.steps_rad = request.goals.as_ref().map(steps_rad).unwrap_or_default();
         Ok(options)
     }
 
@@ -182,4 +200,14 @@ impl<const N: usize> ArmCertifier<N> {
         };
         limits_n_m.iter().zip(gravity).map(|(limit, gravity)| limit - gravity).reduce(f64::min)
     }
+}
+
+/// From each goal of a list to the next.
+fn steps_rad(list: &GoalListValues) -> Vec<Vec<f64>> {
+    let goals = list.goals.iter().map(|(goal, _)| goal);
+    let befores = std::iter::once(&list.start_rad).chain(goals.clone());
+    goals
+        .zip(befores)
+        .map(|(goal, before)| goal.iter().zip(before).map(|(goal, before)| goal - before).collect())
+        .collect()
 }
