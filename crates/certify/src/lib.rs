@@ -12,6 +12,7 @@
 //! | `moving_goal` | the fastest goal that a region allows |
 //! | `sampled_region` | the same of the sampled nonlinear loop |
 //! | `adaptive` | convergence, the frozen loop and the sampled velocity loop of the adaptive controller |
+//! | `lyapunov` | Lyapunov matrices of any linear loop or polytope of loops |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
@@ -20,6 +21,7 @@
 mod adaptive;
 mod exponential;
 mod lmi;
+mod lyapunov;
 mod moving_goal;
 mod problem;
 mod region;
@@ -28,6 +30,7 @@ mod sampled_region;
 pub use adaptive::{adaptive_convergence, adaptive_sampled, pi_exponential};
 pub use exponential::{UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
+pub use lyapunov::{LinearFamily, LyapunovFailure, LyapunovMatrix, fastest_decay, lyapunov};
 pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal};
 pub use problem::{
     AicGainValues, ArmValues, ConstantValues, EnclosureValues, FamilyValues, MracGainValues, Problem, ProblemError,
