@@ -299,7 +299,7 @@ fn eigenvector(a: &DMatrix<f64>, eigenvalue: Complex<f64>) -> Option<DVector<Com
     vector.iter().all(|x| x.re.is_finite() && x.im.is_finite()).then_some(vector)
 }
 
-fn gain_values<const N: usize>(gains: &AicGains<N>) -> AicGainValues {
+pub(crate) fn gain_values<const N: usize>(gains: &AicGains<N>) -> AicGainValues {
     AicGainValues {
         kappa_mu: gains.kappa_mu.to_vec(),
         kappa_a: gains.kappa_a.to_vec(),
