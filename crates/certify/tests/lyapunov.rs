@@ -85,12 +85,12 @@ fn a_double_integrator_needs_damping() {
 
 #[test]
 fn discrete_loops_live_in_the_unit_disk() {
-    // Euler steps of a double integrator under PD, h = 0.1: z^2 - (2 - h d) z + 1 - h d + h^2 k.
-    let step = |d: f64, k: f64| square(&[1.0, 0.1, -0.1 * k, 1.0 - 0.1 * d]);
+    // Euler steps of a double integrator under PD, h = 1/8 so that nothing rounds: z^2 - (2 - h d) z + 1 - h d + h^2 k.
+    let step = |d: f64, k: f64| square(&[1.0, 0.125, -0.125 * k, 1.0 - 0.125 * d]);
     let unit = [disk(0.0, 1.0)];
     assert!(holds(lyapunov(&family(vec![step(2.0, 4.0)]), &unit, LyapunovMatrix::Common)));
     // On the circle (d = h k) and outside.
-    for bad in [step(0.4, 4.0), step(0.0, 4.0), step(25.0, 4.0)] {
+    for bad in [step(0.5, 4.0), step(0.0, 4.0), step(25.0, 4.0)] {
         let refused = lyapunov(&family(vec![bad]), &unit, LyapunovMatrix::Common);
         assert!(matches!(refused, Err(LyapunovFailure::Refused(_))), "{refused:?}");
     }
@@ -185,9 +185,11 @@ fn no_edit_of_a_proof_passes() {
 }
 
 proptest! {
-    /// Random loops of order up to 20: proved exactly when the eigenvalues say so, away from the boundary.
+    // Exact characteristic polynomials of dyadic matrices: a few hundredths of a second each.
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+    /// Random loops of order up to 15: proved exactly when the eigenvalues say so, away from the boundary.
     #[test]
-    fn the_verdict_is_that_of_the_eigenvalues(order in 1_usize..20, seed in prop::collection::vec(-1.0..1.0_f64, 400), shift in -4.0..1.0_f64) {
+    fn the_verdict_is_that_of_the_eigenvalues(order in 1_usize..16, seed in prop::collection::vec(-1.0..1.0_f64, 400), shift in -4.0..1.0_f64) {
         let a = DMatrix::from_fn(order, order, |i, j| seed[i * 20 + j] + if i == j { shift } else { 0.0 });
         let rightmost = a.complex_eigenvalues().iter().map(|z| z.re).fold(f64::NEG_INFINITY, f64::max);
         let farthest = a.complex_eigenvalues().iter().map(|z| z.norm()).fold(0.0, f64::max);
