@@ -45,7 +45,7 @@ fn frozen(gains: &MracGains<7>, goal: &[f64; 7], q: [f64; 7], friction: f64, k0:
             a[(7 + i, 14 + j)] = -inverse[(i, j)] * k_i;
         }
     }
-    Loop::new(a).unwrap()
+    Loop::continuous(a).unwrap()
 }
 
 fn accumulated(certificate: &Certificate) -> f64 {

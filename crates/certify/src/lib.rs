@@ -9,6 +9,9 @@
 //! | `problem` | gains, family and constants of an arm as a document without claims |
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
+//! | `disturbance` | least bound on the error under noise and pushes |
+//! | `digits` | figures rounded to the safe side |
+//! | `joint_region` | the same, an ellipsoid, with gains, frictions and limits of each joint |
 //! | `moving_goal` | the fastest goal that a region allows |
 //! | `sampled_region` | the same of the sampled nonlinear loop |
 //! | `adaptive` | convergence, the frozen loop and the sampled velocity loop of the adaptive controller |
@@ -19,7 +22,10 @@
 #![forbid(unsafe_code)]
 
 mod adaptive;
+mod digits;
+mod disturbance;
 mod exponential;
+mod joint_region;
 mod lmi;
 mod lyapunov;
 mod moving_goal;
@@ -28,10 +34,12 @@ mod region;
 mod sampled_region;
 
 pub use adaptive::{adaptive_convergence, adaptive_sampled, pi_exponential};
+pub use disturbance::{DisturbanceOptions, disturbance};
 pub use exponential::{UnstableLoop, exponential};
+pub use joint_region::{JointRegionOptions, joint_region};
 pub use lmi::{Affine, Program, Solution, SolveError};
 pub use lyapunov::{LinearFamily, LyapunovFailure, LyapunovMatrix, fastest_decay, lyapunov};
-pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal};
+pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal, moving_goal_on};
 pub use problem::{
     AicGainValues, ArmValues, ConstantValues, EnclosureValues, FamilyValues, MracGainValues, Problem, ProblemError,
     SampledConstantValues, arm_ranges,
@@ -62,10 +70,14 @@ pub enum CertifyError {
 pub struct Options {
     /// The region of the nonlinear loop.
     pub region: RegionOptions,
+    /// The region with gains, frictions and limits of each joint.
+    pub joint_region: JointRegionOptions,
     /// The goal that moves.
     pub moving_goal: MovingGoalOptions,
     /// The region of the sampled nonlinear loop.
     pub sampled_region: SampledRegionOptions,
+    /// The error under noise and pushes.
+    pub disturbance: DisturbanceOptions,
 }
 
 /// Makes the claims about a problem, in the order asked for, and has them checked.
@@ -86,8 +98,10 @@ pub fn certify(
         let made = match kind {
             ClaimKind::Exponential => vec![exponential(problem, attain)],
             ClaimKind::Region => vec![region(problem, &options.region)],
+            ClaimKind::JointRegion => vec![joint_region(problem, &options.joint_region)],
             ClaimKind::MovingGoal => moving_goal(problem, &document, &options.moving_goal),
             ClaimKind::SampledRegion => vec![sampled_region(problem, &options.sampled_region)],
+            ClaimKind::Disturbance => vec![disturbance(problem, &options.disturbance)],
             other => vec![not_proved(*other, Reason::FamilyNotCovered, None)],
         };
         document.claims.extend(made.into_iter().map(Into::into));

@@ -212,13 +212,22 @@ impl Candidate {
                 (s[i][j], s[j][i]) = (entry, entry);
             }
         }
-        let mut multiplier = |used: bool| if used { next(true) } else { 0.0 };
-        let mut four = || [multiplier(true), multiplier(true), multiplier(has_friction), multiplier(has_friction)];
+        let mut multiplier = |used: bool, unit: f64| if used { next(true) * unit } else { 0.0 };
+        let mean = motion.remainder().recip();
+        let span = motion.friction()[1].max(1e-3).powi(-2);
+        let mut four = || {
+            [
+                multiplier(true, mean),
+                multiplier(true, mean),
+                multiplier(has_friction, span),
+                multiplier(has_friction, span),
+            ]
+        };
         let (decay, containment) = (four(), four());
-        let growth = [multiplier(true), multiplier(has_friction)];
+        let growth = [multiplier(true, mean), multiplier(has_friction, span)];
         let limited = motion.is_limited();
-        let torque = [multiplier(limited), multiplier(limited && has_friction)];
-        let held = multiplier(is_held);
+        let torque = [multiplier(limited, mean), multiplier(limited && has_friction, span)];
+        let held = multiplier(is_held, (motion.stiffness() * motion.step()).powi(-2));
         // 1 - theta is the variable: both shares must not be negative, one by its sign, one by a block.
         let theta = if motion.has_relative_bound() { 1.0 - next(true) } else { 1.0 };
         SampledUnknowns { p, b, s, theta, decay, containment, growth, torque, held }
@@ -245,6 +254,11 @@ impl Candidate {
         }
         for (index, unit) in (c.error..c.order).zip(&self.units) {
             change[(index, index)] = *unit;
+        }
+        if reach == Reach::Force {
+            for index in c.error + 4..c.order {
+                change[(index, index)] *= motion.step().sqrt();
+            }
         }
         // vb (1 + d0 h/(2m)) = dq + w + (h/2m)(tau - f), and backwards in time.
         let lead = motion.step() / (2.0 * at.inertia);
@@ -303,7 +317,15 @@ impl Candidate {
             }
         }
         blocks.push(Box::new(|x| DMatrix::from_element(1, 1, self.unknowns(x).theta)));
-        let x = Program { cost, nonnegative, blocks }.solve().ok()?.x;
+        let t0 = std::time::Instant::now();
+        let r = Program { cost, nonnegative, blocks }.solve();
+        println!(
+            "{:?} {strictness} {:?} {:?}",
+            self.bounds,
+            t0.elapsed(),
+            r.as_ref().map(|s| (s.accurate, self.unknowns(&s.x).s[0][0]))
+        );
+        let x = r.ok()?.x;
         let found = Found { x: self.unknowns(&x), bounds: self.bounds, points: self.points.clone() };
         (found.start() > 0.0).then_some(found)
     }

@@ -100,7 +100,8 @@ fn radii_with_wide_constants_and_limits() {
     let with = |problem: &Problem, region: RegionOptions| {
         let start = std::time::Instant::now();
         let certificate =
-            certify(problem, &[ClaimKind::Region], &Options { region: region.clone() }, &|| None).unwrap();
+            certify(problem, &[ClaimKind::Region], &Options { region: region.clone(), ..Options::default() }, &|| None)
+                .unwrap();
         let Claim::Region(claim) = &certificate.document().claims[0].claim else {
             panic!("{:?}", certificate.document().claims[0])
         };

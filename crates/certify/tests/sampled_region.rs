@@ -14,6 +14,8 @@ fn look() {
         (1, [1.0, 3.0], Compensation::Held, None, 0.01),
         (0, [1.0, 3.0], Compensation::Held, None, 0.01),
         (2, [1.0, 3.0], Compensation::Held, None, 0.01),
+        (1, [0.0, 0.0], Compensation::Continuous, None, 0.01),
+        (0, [0.0, 0.0], Compensation::Continuous, None, 0.01),
         (1, [1.0, 1.0], Compensation::Held, Some(87.0), 0.01),
         (1, [1.0, 1.0], Compensation::Held, None, 0.3),
     ] {

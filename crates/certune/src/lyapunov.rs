@@ -6,7 +6,7 @@ use certune_control::aic::{AicGains, AicParams};
 use certune_linsys::Joints;
 use certune_verify::{Certificate, Claim, ClaimKind, NotProvedClaim, Number, PlaneRegion, Reason, seal, verify};
 
-use crate::stability::{ArmCertifier, STEP_S, StabilityError, gain_values};
+use crate::stability::{ArmCertifier, ArmGains, STEP_S, StabilityError};
 
 /// Shares of the slowest eigenvalue's decay that are tried in turn.
 const SHARES: [f64; 4] = [0.99, 0.97, 0.9, 0.5];
@@ -18,7 +18,7 @@ impl<const N: usize> ArmCertifier<N> {
     /// When the gains are not valid or the loop is not finite; [`StabilityError::Certify`] would be a defect of this workspace.
     pub fn certify_at(&self, gains: &AicGains<N>, q_rad: [f64; N]) -> Result<Certificate, StabilityError> {
         let params = AicParams::new(gains, STEP_S)?;
-        let problem = self.problem(gain_values(gains).written()?)?;
+        let problem = self.problem(ArmGains::from(*gains).written()?)?;
         let least = self.family().friction_n_m_s_per_rad[0];
         let axes = self.members().axes();
         // The middle of every scale: the nominal masses.

@@ -49,6 +49,7 @@ pub use document::{
 pub use error::{Flaw, Rejection, VerifyError};
 pub use form::{Field, Form, Row};
 pub use gains::{Gains, MracGains, MracLaw};
+pub use normed::{Norm, region_norm};
 pub use number::{Number, NumberError};
 pub use record::{BoundProof, Record};
 pub use statement::Assumption;

@@ -13,6 +13,7 @@
 mod attacks;
 mod chance;
 mod continuous;
+mod held;
 mod members;
 mod subjects;
 

@@ -37,6 +37,7 @@ use crate::aic::STATES;
 use crate::document::Document;
 use crate::error::Flaw;
 use crate::form::{Field, Form, Row};
+use crate::normed::{Norm, Normed};
 use crate::number::{Number, unit_interval};
 use crate::quantity::{require, require_length, require_plain, require_positive};
 use crate::statement::list;
@@ -289,6 +290,32 @@ impl JointRegionClaim {
             gravity_multiplier: gravity_multiplier.value().clone(),
             start_multiplier: start_multiplier.value().clone(),
         })
+    }
+}
+
+impl Normed for JointRegionClaim {
+    fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
+        Ok(Norm {
+            shift_weights: self.start_weights(document)?,
+            rate: self.rate_per_s.value().clone(),
+            period: None,
+            kept: self.distances_rad.clone(),
+        })
+    }
+
+    fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
+        let closeness = (most * most).recip();
+        let mut all = Vec::new();
+        for (joint, weights) in self.witness.joints.iter().enumerate() {
+            let problem = JointProblem::new(document, joint)?;
+            for (s, end) in weights.s.iter().zip(["least", "largest"]) {
+                let point = self.point(&problem.plant, &weights.b, s)?;
+                let form = problem.within(&point, State::Position, &closeness);
+                let name = format!("distance of joint {} at the {end} friction", joint + 1);
+                all.push(Inequality::decide(name, &form.0));
+            }
+        }
+        Ok(all)
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod adaptive_convergence;
 mod adaptive_sampled;
+mod disturbance;
 mod energy;
 mod exponential;
 mod joint_region;
@@ -26,6 +27,7 @@ pub use adaptive_convergence::{
     AdaptiveConvergenceClaim, AdaptiveLoop, AdaptiveRefusedClaim, AdaptiveWitness, adaptive_inequalities,
 };
 pub use adaptive_sampled::{AdaptiveSampledClaim, AdaptiveSampledRefusedClaim};
+pub use disturbance::{DisturbanceClaim, DisturbanceWitness, DisturbedArm, disturbance_inequalities};
 pub use energy::{Energy, Plant, Point, State, TRIANGLE, triangle};
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
 pub use joint_region::{
@@ -72,6 +74,8 @@ pub enum Claim {
     Lyapunov(Box<LyapunovClaim>),
     /// One of them has not.
     LyapunovRefused(Box<LyapunovRefusedClaim>),
+    /// The error stays bounded under bounded noise and pushes.
+    Disturbance(Box<DisturbanceClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -94,6 +98,7 @@ impl Claim {
             Self::SampledRegion(claim) => claim.as_ref(),
             Self::Lyapunov(claim) => claim.as_ref(),
             Self::LyapunovRefused(claim) => claim.as_ref(),
+            Self::Disturbance(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -118,6 +123,7 @@ impl Claim {
             | Self::JointRegion(_)
             | Self::MovingGoal(_)
             | Self::SampledRegion(_)
+            | Self::Disturbance(_)
             | Self::AdaptiveConvergence(_)
             | Self::PiExponential(_)
             | Self::AdaptiveSampled(_)
@@ -160,6 +166,21 @@ pub enum ClaimKind {
 }
 
 impl ClaimKind {
+    /// Every kind.
+    pub const ALL: [Self; 11] = [
+        Self::Exponential,
+        Self::Sampled,
+        Self::Region,
+        Self::JointRegion,
+        Self::SampledRegion,
+        Self::MovingGoal,
+        Self::Disturbance,
+        Self::Lyapunov,
+        Self::AdaptiveConvergence,
+        Self::PiExponential,
+        Self::AdaptiveSampled,
+    ];
+
     /// The name as it is written in files and flags.
     pub fn name(self) -> &'static str {
         match self {
