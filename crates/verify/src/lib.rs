@@ -26,7 +26,9 @@ mod document;
 mod error;
 mod exponential;
 mod number;
+mod polytope;
 mod region;
+mod sampled;
 mod statement;
 
 pub use aic::AicGains;
@@ -39,4 +41,5 @@ pub use error::{Rejection, VerifyError};
 pub use exponential::{LoopBox, LoopFamily};
 pub use number::{Number, NumberError};
 pub use region::{Inequality, region_inequalities};
+pub use sampled::{MOST_DELAY_SAMPLES, Plant, SampledFamily};
 pub use statement::Assumption;

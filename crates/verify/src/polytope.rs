@@ -1,0 +1,232 @@
+//! A box of polynomials, affine in its parameters: is every one of them stable?
+//!
+//! ```text
+//! p(s; x) = p_0(s) + sum_j x_j p_j(s),    x_j in [lower_j, upper_j]
+//! ```
+//!
+//! By the edge theorem (Bartlett, Hollot, Huang 1988) no polynomial of the box has a root on the imaginary axis if none of its edges
+//! has one and the leading coefficient does not vanish; all then have as many roots on the right as one corner. An edge joins two corners
+//! P and Q. `j w` is a root of one of its polynomials iff 0 lies on the segment from `P(jw)` to `Q(jw)`, that is
+//!
+//! ```text
+//! Im P(jw) conj(Q(jw)) = 0    and    Re P(jw) conj(Q(jw)) <= 0,
+//! ```
+//!
+//! the first `w` times a polynomial in `w^2`, the second a polynomial in `w^2`: a Sturm-Tarski count decides it exactly. Polynomials in z
+//! are mapped by `z = (1 + w)/(1 - w)` first, a linear map of the coefficients. Proofs: `proofs/claims/exponential.md`, `sampled.md`.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use num_traits::{One, Signed, Zero};
+
+use crate::algebra::{Polynomial, common_integers, is_hurwitz};
+
+/// Where a proof about a box stops.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum BoxFlaw {
+    /// A range is empty.
+    Empty,
+    /// The polynomial at all lower ends is not stable.
+    FirstCorner,
+    /// The leading or the constant coefficient changes its sign or vanishes.
+    Ends,
+    /// A root reaches the boundary along an edge of this axis.
+    Edge(usize),
+}
+
+/// The polynomials `parts[0] + sum_j x_j parts[j + 1]`, coefficients from the highest power down, all of one length.
+#[derive(Clone, Debug)]
+pub(crate) struct AffineFamily(pub(crate) Vec<Vec<BigRational>>);
+
+impl AffineFamily {
+    /// The same family under a linear map of its polynomials.
+    pub(crate) fn map(&self, f: impl Fn(&[BigRational]) -> Vec<BigRational>) -> Self {
+        Self(self.0.iter().map(|part| f(part)).collect())
+    }
+
+    /// The polynomial at a point.
+    pub(crate) fn at(&self, point: &[&BigRational]) -> Vec<BigRational> {
+        let Some((constant, parts)) = self.0.split_first() else { return Vec::new() };
+        let mut p = constant.clone();
+        for (part, &x) in parts.iter().zip(point) {
+            if !x.is_zero() {
+                for (sum, c) in p.iter_mut().zip(part) {
+                    *sum += c * x;
+                }
+            }
+        }
+        p
+    }
+
+    /// Whether the polynomial at a point is Hurwitz. Exact.
+    pub(crate) fn is_hurwitz_at(&self, point: &[&BigRational]) -> bool {
+        common_integers(&[self.at(point)]).iter().all(|p| is_hurwitz(p))
+    }
+
+    /// Whether every polynomial of the box is Hurwitz. Exact; the leading coefficient must be positive.
+    pub(crate) fn is_hurwitz_on(&self, ranges: &[[BigRational; 2]]) -> Result<(), BoxFlaw> {
+        let corners = self.corners(ranges)?;
+        if corners.first().is_none_or(|first| !is_hurwitz(first)) {
+            return Err(BoxFlaw::FirstCorner);
+        }
+        no_root_on_the_axis(&corners, ranges)
+    }
+
+    /// Whether no polynomial of the box is Hurwitz: one corner is not, and no root crosses the axis within the box. Exact.
+    pub(crate) fn is_nowhere_hurwitz_on(&self, ranges: &[[BigRational; 2]]) -> bool {
+        let Ok(corners) = self.corners(ranges) else { return false };
+        let unstable = corners.first().is_some_and(|first| {
+            let sign_fixed: Vec<BigInt> =
+                if first[0].is_negative() { first.iter().map(|c| -c).collect() } else { first.clone() };
+            !is_hurwitz(&sign_fixed)
+        });
+        unstable && no_root_on_the_axis(&corners, ranges).is_ok()
+    }
+
+    /// Corner k has bit j set where axis j is at its upper end. One factor for all: edges join polynomials in their true proportions.
+    fn corners(&self, ranges: &[[BigRational; 2]]) -> Result<Vec<Vec<BigInt>>, BoxFlaw> {
+        if ranges.iter().any(|[lower, upper]| lower > upper) {
+            return Err(BoxFlaw::Empty);
+        }
+        let corner = |k: usize| {
+            let point: Vec<&BigRational> = ranges.iter().enumerate().map(|(j, range)| &range[k >> j & 1]).collect();
+            self.at(&point)
+        };
+        Ok(common_integers(&(0..1_usize << ranges.len()).map(corner).collect::<Vec<_>>()))
+    }
+}
+
+fn no_root_on_the_axis(corners: &[Vec<BigInt>], ranges: &[[BigRational; 2]]) -> Result<(), BoxFlaw> {
+    // Affine, so the corners tell: the degree does not drop, and 0 is no root.
+    for end in [<[BigInt]>::first, <[BigInt]>::last] {
+        let mut signs = corners.iter().map(|p| end(p).map_or_else(BigInt::zero, BigInt::signum));
+        let first = signs.next().unwrap_or_default();
+        if first.is_zero() || signs.any(|sign| sign != first) {
+            return Err(BoxFlaw::Ends);
+        }
+    }
+    for (j, [lower, upper]) in ranges.iter().enumerate() {
+        if lower == upper {
+            continue;
+        }
+        // A flat axis has its two ends in one place: the edges at its lower end are all there are.
+        let flat = |k: usize| ranges.iter().enumerate().any(|(i, [l, u])| k >> i & 1 == 1 && l == u);
+        for from in (0..corners.len()).filter(|&k| k >> j & 1 == 0 && !flat(k)) {
+            if !edge_avoids_the_axis(&corners[from], &corners[from | 1 << j]) {
+                return Err(BoxFlaw::Edge(j));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Whether no polynomial between two has a root `j w`, `w != 0`.
+fn edge_avoids_the_axis(from: &[BigInt], to: &[BigInt]) -> bool {
+    // p(jw) = even(w^2) + j w odd(w^2), as polynomials in y = w^2 from the constant up.
+    let parts = |p: &[BigInt]| {
+        let alternating = |parity: usize| {
+            let picked = p.iter().rev().skip(parity).step_by(2).enumerate();
+            Polynomial::new(picked.map(|(k, c)| if k % 2 == 0 { c.clone() } else { -c }).collect())
+        };
+        [alternating(0), alternating(1)]
+    };
+    let [[from_even, from_odd], [to_even, to_odd]] = [parts(from), parts(to)];
+    // Im P conj(Q) = w (odd_P even_Q - even_P odd_Q),  Re = even_P even_Q + y odd_P odd_Q.
+    let imaginary = from_odd.times(&to_even).plus(-1, 0, &from_even.times(&to_odd));
+    let real = from_even.times(&to_even).plus(1, 1, &from_odd.times(&to_odd));
+    match (imaginary.signs_at_positive_roots(&Polynomial::one()), imaginary.signs_at_positive_roots(&real)) {
+        (Some(roots), Some(positive)) => roots == positive,
+        _ => false,
+    }
+}
+
+/// `(1 - w)^n p((1 + w)/(1 - w))` for p of degree n in z, coefficients from the highest power down: p has all roots inside the unit
+/// circle iff the result, of degree n, is Hurwitz (or minus it is).
+pub(crate) fn moebius(p: &[BigRational]) -> Vec<BigRational> {
+    // Horner in z with the powers of (1 - w) carried along: r <- r (1 + w) + c (1 - w)^k.
+    let mut result: Vec<BigRational> = Vec::new();
+    let mut power = vec![BigRational::one()];
+    let times = |q: &[BigRational], sign: bool| {
+        // q (w + 1) or q (-w + 1), highest power first.
+        let mut out = vec![BigRational::zero(); q.len() + 1];
+        for (k, c) in q.iter().enumerate() {
+            out[k + 1] += c;
+            if sign { out[k] += c } else { out[k] -= c }
+        }
+        out
+    };
+    for c in p {
+        result = if result.is_empty() { vec![BigRational::zero()] } else { times(&result, true) };
+        for (sum, x) in result.iter_mut().zip(&power) {
+            *sum += x * c;
+        }
+        power = times(&power, false);
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::number::ratio;
+    use proptest::prelude::*;
+
+    fn poly(values: &[i64]) -> Vec<BigRational> {
+        values.iter().map(|&v| ratio(v, 1)).collect()
+    }
+
+    #[test]
+    fn the_unit_circle_maps_to_the_axis() {
+        // z - r goes to (1 + r) w + (1 - r).
+        assert_eq!(moebius(&poly(&[2, -1])), poly(&[3, 1]));
+        // z^2 + 1 has its roots on the circle: 2 w^2 + 2.
+        assert_eq!(moebius(&poly(&[1, 0, 1])), poly(&[2, 0, 2]));
+    }
+
+    #[test]
+    fn a_stable_pair_of_ends_does_not_make_a_stable_edge() {
+        // s^3 + x s^2 + (3 - x) s + 1 is stable for x (3 - x) > 1: between 0.38 and 2.62, where both coefficients are positive.
+        let family = AffineFamily(vec![poly(&[1, 0, 3, 1]), poly(&[0, 1, -1, 0])]);
+        assert_eq!(family.is_hurwitz_on(&[[ratio(1, 2), ratio(5, 2)]]), Ok(()));
+        assert_eq!(family.is_hurwitz_on(&[[ratio(1, 2), ratio(27, 10)]]), Err(BoxFlaw::Edge(0)));
+        assert_eq!(family.is_hurwitz_on(&[[ratio(1, 5), ratio(3, 10)]]), Err(BoxFlaw::FirstCorner));
+        assert!(family.is_nowhere_hurwitz_on(&[[ratio(1, 5), ratio(3, 10)]]));
+        assert!(!family.is_nowhere_hurwitz_on(&[[ratio(1, 5), ratio(1, 2)]]));
+        // The box in between is unstable although both ends are stable: (s + 1)^3 against a far polynomial.
+        let far = AffineFamily(vec![poly(&[1, 10, 10, 1]), poly(&[0, -20, -20, 200])]);
+        assert!(far.is_hurwitz_at(&[&ratio(0, 1)]));
+        assert_ne!(far.is_hurwitz_on(&[[ratio(0, 1), ratio(1, 1)]]), Ok(()));
+        // A real root through 0, and a degree that drops.
+        let through_zero = AffineFamily(vec![poly(&[1, 3, 1]), poly(&[0, 0, -2])]);
+        assert_eq!(through_zero.is_hurwitz_on(&[[ratio(0, 1), ratio(1, 1)]]), Err(BoxFlaw::Ends));
+        let drop = AffineFamily(vec![poly(&[1, 3, 1]), poly(&[-1, 0, 0])]);
+        assert_eq!(drop.is_hurwitz_on(&[[ratio(0, 1), ratio(1, 1)]]), Err(BoxFlaw::Ends));
+        assert_eq!(drop.is_hurwitz_on(&[[ratio(1, 1), ratio(0, 1)]]), Err(BoxFlaw::Empty));
+    }
+
+    proptest! {
+        /// An edge against a fine scan of it: a scan that finds an unstable polynomial must find the edge refused, and an edge refused
+        /// must have a polynomial near the axis.
+        #[test]
+        fn edges_agree_with_a_scan(p in prop::collection::vec(1_i64..30, 6), q in prop::collection::vec(1_i64..30, 6)) {
+            let difference: Vec<i64> = q.iter().zip(&p).map(|(q, p)| q - p).collect();
+            let family = AffineFamily(vec![poly(&p), poly(&difference)]);
+            let stable = |k: i64| family.is_hurwitz_at(&[&ratio(k, 60)]);
+            let whole = family.is_hurwitz_on(&[[ratio(0, 1), ratio(1, 1)]]).is_ok();
+            let scan = (0..=60).all(stable);
+            prop_assert!(!whole || scan);
+            // Where two neighbours differ, the piece between them is refused and neither kind is certified on it.
+            for k in 0..60 {
+                let piece = [[ratio(k, 60), ratio(k + 1, 60)]];
+                if stable(k) != stable(k + 1) {
+                    prop_assert!(family.is_hurwitz_on(&piece).is_err() && !family.is_nowhere_hurwitz_on(&piece));
+                }
+            }
+            if scan && !whole {
+                // Pieces refused although both ends are stable: only where the roots come close to the axis.
+                let refused = (0..60).filter(|&k| family.is_hurwitz_on(&[[ratio(k, 60), ratio(k + 1, 60)]]).is_err()).count();
+                prop_assert!(refused <= 6, "{}", refused);
+            }
+        }
+    }
+}
