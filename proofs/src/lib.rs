@@ -6,10 +6,10 @@
 
 use std::path::{Path, PathBuf};
 
-use certune::certify::{Claims, FamilyValues};
+use certune::certify::FamilyValues;
 use certune::closed_loop::{FileError, Gains, GainsFile, KeyError};
 use certune::dynamics::Robot;
-use certune::verify::{Certificate, Rejection, VerifyError};
+use certune::verify::{Certificate, ClaimKind, Rejection, VerifyError};
 use certune::{ArmCertifier, StabilityError, certificate_text};
 
 /// Why a claim could not be derived or compared.
@@ -58,12 +58,12 @@ pub fn nominal_family(gravity_compensation: bool, friction_n_m_s_per_rad: [f64; 
 ///
 /// # Errors
 /// [`ProofError`] when the preset or the arm is broken.
-pub fn published(family: &FamilyValues, claims: Claims) -> Result<Certificate, ProofError> {
+pub fn published(family: &FamilyValues, claim: ClaimKind) -> Result<Certificate, ProofError> {
     let text = include_str!("../../tuning/presets/pezzato2020-simulation.toml");
     let file = GainsFile::parse(Path::new("pezzato2020-simulation.toml"), text)?;
     let Gains::Aic(table) = file.gains else { return Err(ProofError::Controller) };
     let gains = table.bind::<7>()?;
-    Ok(ArmCertifier::new(&Robot::panda(), family)?.certify(&gains, claims)?)
+    Ok(ArmCertifier::new(&Robot::panda(), family)?.certify(&gains, &[claim])?)
 }
 
 /// The stored certificate of a claim, checked; written first when `CERTUNE_WRITE_CLAIMS` is set.
@@ -77,5 +77,5 @@ pub fn stored(name: &str, derived: &Certificate) -> Result<Certificate, ProofErr
         std::fs::write(&path, certificate_text(derived)?).map_err(failed)?;
     }
     let text = std::fs::read_to_string(&path).map_err(failed)?;
-    Ok(certune::verify::verify(&text)??)
+    Ok(certune::verify::verify(&text, &[])??)
 }

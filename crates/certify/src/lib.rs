@@ -8,6 +8,8 @@
 //! |---|---|
 //! | `problem` | gains, family and constants of an arm as a document without claims |
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
+//! | `sampled` | decay rate and delay margin of the sampled linearised loops, or a counterexample |
+//! | `margins` | how far a bound of the family may, or must, be moved |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
@@ -16,15 +18,22 @@
 
 mod exponential;
 mod lmi;
+mod margins;
 mod problem;
 mod region;
+mod sampled;
 
-pub use exponential::{UnstableLoop, exponential};
+pub use exponential::{Attain, UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
-pub use problem::{AicGainValues, ArmValues, FamilyValues, Problem, ProblemError, SampledConstantValues};
+pub use problem::{
+    AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, ProblemError, SampledConstantValues, arm_ranges,
+};
 pub use region::{RegionOptions, region};
+pub use sampled::{SampledOptions, light_inertia_rule_s, sampled};
 
-use certune_verify::{Attained, Certificate, Claim, Document, Rejection, seal, verify};
+use certune_verify::{
+    Certificate, Claim, ClaimKind, Document, NotProvedClaim, Number, Reason, Rejection, seal, verify,
+};
 
 /// A document could not be turned into a certificate by its own checker: a defect of this crate, never of the input.
 #[derive(Debug, thiserror::Error)]
@@ -40,39 +49,46 @@ pub enum CertifyError {
     Unwritable(#[from] serde_json::Error),
 }
 
-/// Which claims to make.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Claims {
-    /// Only the linearised loops.
-    Exponential,
-    /// Only the nonlinear region.
-    Region,
-    /// Both.
-    All,
+/// How each kind of claim is searched.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// The region of the nonlinear loop.
+    pub region: RegionOptions,
+    /// The sampled loop.
+    pub sampled: SampledOptions,
 }
 
-/// Makes the claims about a problem, and returns the sealed document and its verdict.
+/// Makes the claims about a problem, in the order asked for, and has them checked.
 ///
-/// `attain` is asked, after a refusal of `exponential`, for an arm and configuration of the family whose linearised loop is
-/// unstable; it may return `None`.
+/// `attain` is asked, after a refusal of `exponential` or `sampled`, for an arm and configuration of the family whose linearised loop, in continuous
+/// time or sampled, is unstable; it may return `None`.
 ///
 /// # Errors
 /// [`CertifyError`] when the checker does not accept the document, which would be a defect of this crate.
 pub fn certify(
     problem: &Problem,
-    claims: Claims,
-    options: &RegionOptions,
-    attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>,
+    claims: &[ClaimKind],
+    options: &Options,
+    attain: &Attain<'_>,
 ) -> Result<Certificate, CertifyError> {
-    let mut entries: Vec<Claim> = Vec::new();
-    if matches!(claims, Claims::Exponential | Claims::All) {
-        entries.push(exponential(problem, attain));
+    let mut document = problem.document().clone();
+    for kind in claims {
+        let claim = match kind {
+            ClaimKind::Exponential => exponential(problem, attain),
+            ClaimKind::Sampled => sampled(problem, &options.sampled, attain),
+            ClaimKind::Region => region(problem, &options.region),
+            other => not_proved(*other, Reason::FamilyNotCovered, None),
+        };
+        document.claims.push(claim.into());
     }
-    if matches!(claims, Claims::Region | Claims::All) {
-        entries.push(region(problem, options));
-    }
-    let document = seal(Document { claims: entries, ..problem.document().clone() });
-    Ok(verify(&to_json(&document)?)??)
+    let document = seal(document);
+    Ok(verify(&to_json(&document)?, problem.records())??)
+}
+
+/// An entry that says why there is neither a proof nor a counterexample.
+pub(crate) fn not_proved(of: ClaimKind, reason: Reason, distance: Option<f64>) -> Claim {
+    let distance = distance.and_then(Number::decimal);
+    Claim::NotProved(NotProvedClaim { of, sampling: None, distance, reason, remedies: Vec::new() })
 }
 
 /// The text of a sealed document, as it is written to a file.

@@ -14,7 +14,8 @@
 //! | [`ArmCertifier`] | an arm, its family of plants and a controller, to a certificate |
 //!
 //! ```
-//! use certune::certify::{Claims, FamilyValues};
+//! use certune::certify::FamilyValues;
+//! use certune::verify::ClaimKind;
 //! use certune::{ArmCertifier, control::aic::AicGains, dynamics::Robot};
 //!
 //! let family = FamilyValues {
@@ -33,7 +34,8 @@
 //!     sigma_dmu: [10.0; 7],
 //!     reference_time_constant_s: [1.0; 7],
 //! };
-//! let certificate = ArmCertifier::<7>::new(&Robot::panda(), &family)?.certify(&published, Claims::All)?;
+//! let claims = [ClaimKind::Exponential, ClaimKind::Region];
+//! let certificate = ArmCertifier::<7>::new(&Robot::panda(), &family)?.certify(&published, &claims)?;
 //! assert!(certificate.all_hold());
 //! # Ok::<(), certune::StabilityError>(())
 //! ```

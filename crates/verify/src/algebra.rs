@@ -1,13 +1,11 @@
 //! Exact linear algebra and polynomials over the rationals.
 //!
-//! Determinants and Sturm sequences run over the integers (Bareiss; primitive remainders), where no fraction has to be
-//! reduced at every step.
+//! Hurwitz determinants run over the integers (Bareiss), where no fraction has to be reduced at every step.
 //!
 //! Sources: characteristic polynomial and adjugate by Faddeev and LeVerrier; stability of a polynomial by Hurwitz determinants
-//! (Gantmacher, *Theory of Matrices*, vol. 2, ch. XV); signs at real roots by the Sturm-Tarski theorem (Basu, Pollack, Roy,
-//! *Algorithms in Real Algebraic Geometry*, theorem 2.73); definiteness by LDL'.
+//! (Gantmacher, *Theory of Matrices*, vol. 2, ch. XV); definiteness by LDL'.
 
-use num_bigint::{BigInt, Sign};
+use num_bigint::BigInt;
 use num_integer::Integer;
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
@@ -144,109 +142,6 @@ pub(crate) fn is_hurwitz(p: &[BigInt]) -> bool {
     true
 }
 
-/// A polynomial in one variable with integer coefficients, from the constant up, without trailing zeros.
-///
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Polynomial(Vec<BigInt>);
-
-impl Polynomial {
-    /// The polynomial of these coefficients.
-    pub(crate) fn new(mut coefficients: Vec<BigInt>) -> Self {
-        while coefficients.last().is_some_and(Zero::is_zero) {
-            coefficients.pop();
-        }
-        Self(coefficients)
-    }
-
-    /// 1.
-    pub(crate) fn one() -> Self {
-        Self(vec![BigInt::one()])
-    }
-
-    /// Divided by the content of its coefficients, which is positive: the same roots and signs in smaller numbers.
-    fn primitive(mut self) -> Self {
-        let content = self.0.iter().fold(BigInt::zero(), |gcd, c| gcd.gcd(c));
-        if content > BigInt::one() {
-            for c in &mut self.0 {
-                *c = &*c / &content;
-            }
-        }
-        self
-    }
-
-    /// The product of two.
-    pub(crate) fn times(&self, other: &Self) -> Self {
-        let mut product = vec![BigInt::zero(); (self.0.len() + other.0.len()).saturating_sub(1)];
-        for (i, x) in self.0.iter().enumerate() {
-            for (j, y) in other.0.iter().enumerate() {
-                product[i + j] += x * y;
-            }
-        }
-        Self::new(product)
-    }
-
-    /// `self + factor x^shift other`.
-    pub(crate) fn plus(mut self, factor: i8, shift: usize, other: &Self) -> Self {
-        self.0.resize(self.0.len().max(other.0.len() + shift), BigInt::zero());
-        for (k, c) in other.0.iter().enumerate() {
-            self.0[k + shift] += c * factor;
-        }
-        Self::new(self.0)
-    }
-
-    fn derivative(&self) -> Self {
-        Self::new(self.0.iter().enumerate().skip(1).map(|(k, c)| c * BigInt::from(k)).collect())
-    }
-
-    /// Minus the remainder of `self / divisor`, times a positive number.
-    fn negative_remainder(&self, divisor: &Self) -> Self {
-        let mut rest = self.0.clone();
-        let Some(lead) = divisor.0.last() else { return Self(Vec::new()) };
-        while rest.len() >= divisor.0.len() {
-            let Some(top) = rest.last().cloned() else { break };
-            // |lead| rest - sign(lead) top x^shift divisor: the top cancels, and |lead| is positive.
-            let top = if lead.is_negative() { -top } else { top };
-            let shift = rest.len() - divisor.0.len();
-            for c in &mut rest {
-                *c *= lead.abs();
-            }
-            for (k, c) in divisor.0.iter().enumerate() {
-                rest[shift + k] -= &top * c;
-            }
-            rest.pop();
-        }
-        Self::new(rest.into_iter().map(|c| -c).collect()).primitive()
-    }
-
-    /// Over the distinct roots `x > 0` of the polynomial: how many have `weight(x) > 0`, less how many have `weight(x) < 0`.
-    ///
-    /// Exact, by the Sturm-Tarski theorem: the sign changes at 0, less those at infinity, of the signed remainder sequence that
-    /// starts with the polynomial and its derivative times the weight. With weight 1 it counts the positive roots. `None` for the
-    /// zero polynomial.
-    pub(crate) fn signs_at_positive_roots(&self, weight: &Self) -> Option<isize> {
-        // Roots at 0 do not count, and the theorem wants none at an end.
-        let at_zero = self.0.iter().take_while(|c| c.is_zero()).count();
-        let stripped = Self(self.0.get(at_zero..)?.to_vec()).primitive();
-        if stripped.0.is_empty() {
-            return None;
-        }
-        let mut chain = vec![stripped.clone(), stripped.derivative().times(weight).primitive()];
-        while let [.., before, last] = &chain[..] {
-            if last.0.is_empty() {
-                break;
-            }
-            let next = before.negative_remainder(last);
-            chain.push(next);
-        }
-        let changes = |end: fn(&[BigInt]) -> Option<&BigInt>| {
-            let signs: Vec<Sign> =
-                chain.iter().filter_map(|p| end(&p.0)).map(BigInt::sign).filter(|&s| s != Sign::NoSign).collect();
-            signs.windows(2).filter(|pair| pair[0] != pair[1]).count().cast_signed()
-        };
-        Some(changes(|p| p.first()) - changes(|p| p.last()))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -309,36 +204,36 @@ mod tests {
     }
 
     #[test]
-    fn sturm_sees_double_roots_and_leaves_out_zero() {
-        let count = |p: &[i64]| Polynomial::new(integers(p)).signs_at_positive_roots(&Polynomial::one());
-        assert_eq!(count(&[1, -2, 1]), Some(1), "(x - 1)^2 has one distinct root");
-        assert_eq!(count(&[0, 0, -1, 1]), Some(1), "x^2 (x - 1)");
-        assert_eq!(count(&[0, 1]), Some(0));
-        assert_eq!(count(&[3]), Some(0));
-        assert_eq!(count(&[]), None);
-    }
-
-    #[test]
     fn the_adjugate_times_the_matrix_is_the_determinant() {
         let a = matrix(&[&[1, 2, 3], &[-1, 0, 2], &[4, 1, -5]]);
         let (determinant, adjugate) = resolvent(&a);
         let value = |x: i64| {
             let at = |k: usize| ratio(x.pow((2 - k).try_into().unwrap()), 1);
             let mut adj = zeros(3);
-            for (k, part) in adjugate.iter().enumerate() { for i in 0..3 { for j in 0..3 { adj[i][j] += at(k) * &part[i][j]; } } }
+            for (k, part) in adjugate.iter().enumerate() {
+                for i in 0..3 {
+                    for j in 0..3 {
+                        adj[i][j] += at(k) * &part[i][j];
+                    }
+                }
+            }
             adj
         };
         for x in 2..5 {
             let mut shifted = a.clone();
             for (i, row) in shifted.iter_mut().enumerate() {
-                for entry in row.iter_mut() { *entry = -entry.clone(); }
+                for entry in row.iter_mut() {
+                    *entry = -entry.clone();
+                }
                 row[i] += ratio(x, 1);
             }
             let d = determinant.iter().fold(ratio(0, 1), |sum, c| sum * ratio(x, 1) + c);
             let product = multiply(&shifted, &value(x));
-            for (i, row) in product.iter().enumerate() { for (j, entry) in row.iter().enumerate() {
-                assert_eq!(*entry, if i == j { d.clone() } else { ratio(0, 1) });
-            } }
+            for (i, row) in product.iter().enumerate() {
+                for (j, entry) in row.iter().enumerate() {
+                    assert_eq!(*entry, if i == j { d.clone() } else { ratio(0, 1) });
+                }
+            }
         }
     }
 
@@ -368,20 +263,6 @@ mod tests {
             for (i, c) in p.iter().enumerate() { for (j, d) in quadratic.iter().enumerate() { product[i + j] += c * d; } }
             p = product;
             prop_assert_eq!(is_hurwitz(&one_in_integers(p)), real.iter().all(|&r| r < 0) && pair.0 < 0);
-        }
-
-        #[test]
-        fn sturm_agrees_with_chosen_roots(roots in prop::collection::vec(-20_i64..20, 1..6), weight in prop::collection::vec(-30_i64..30, 0..4)) {
-            let up = |roots: &[i64]| {
-                let mut down = with_roots(&roots.iter().map(|&r| ratio(r, 4)).collect::<Vec<_>>());
-                down.reverse();
-                Polynomial::new(one_in_integers(down))
-            };
-            let mut distinct: Vec<i64> = roots.iter().copied().filter(|&r| r > 0).collect();
-            distinct.sort_unstable();
-            distinct.dedup();
-            let signs: i64 = distinct.iter().map(|r| weight.iter().map(|w| (r - w).signum()).product::<i64>()).sum();
-            prop_assert_eq!(up(&roots).signs_at_positive_roots(&up(&weight)), Some(signs as isize));
         }
     }
 }

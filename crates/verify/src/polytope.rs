@@ -12,14 +12,15 @@
 //! Im P(jw) conj(Q(jw)) = 0    and    Re P(jw) conj(Q(jw)) <= 0,
 //! ```
 //!
-//! the first `w` times a polynomial in `w^2`, the second a polynomial in `w^2`: a Sturm-Tarski count decides it exactly. Polynomials in z
+//! the first `w` times a polynomial in `w^2`, the second a polynomial in `w^2`. That both never hold is shown interval by interval of `w^2` from the signs of
+//! integer Bernstein coefficients: where all of one polynomial have one sign it has no root, and what is left is halved. Polynomials in z
 //! are mapped by `z = (1 + w)/(1 - w)` first, a linear map of the coefficients. Proofs: `proofs/claims/exponential.md`, `sampled.md`.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 
-use crate::algebra::{Polynomial, common_integers, is_hurwitz};
+use crate::algebra::{common_integers, is_hurwitz};
 
 /// Where a proof about a box stops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,22 +123,90 @@ fn no_root_on_the_axis(corners: &[Vec<BigInt>], ranges: &[[BigRational; 2]]) -> 
 
 /// Whether no polynomial between two has a root `j w`, `w != 0`.
 fn edge_avoids_the_axis(from: &[BigInt], to: &[BigInt]) -> bool {
-    // p(jw) = even(w^2) + j w odd(w^2), as polynomials in y = w^2 from the constant up.
-    let parts = |p: &[BigInt]| {
-        let alternating = |parity: usize| {
-            let picked = p.iter().rev().skip(parity).step_by(2).enumerate();
-            Polynomial::new(picked.map(|(k, c)| if k % 2 == 0 { c.clone() } else { -c }).collect())
-        };
-        [alternating(0), alternating(1)]
+    // p(jw) = even(y) + j w odd(y), y = w^2, coefficients from the constant up.
+    let part = |p: &[BigInt], parity: usize| -> Vec<BigInt> {
+        let picked = p.iter().rev().skip(parity).step_by(2).enumerate();
+        picked.map(|(k, c)| if k % 2 == 0 { c.clone() } else { -c }).collect()
     };
-    let [[from_even, from_odd], [to_even, to_odd]] = [parts(from), parts(to)];
+    let mut imaginary = vec![BigInt::zero(); from.len()];
+    let mut real = imaginary.clone();
     // Im P conj(Q) = w (odd_P even_Q - even_P odd_Q),  Re = even_P even_Q + y odd_P odd_Q.
-    let imaginary = from_odd.times(&to_even).plus(-1, 0, &from_even.times(&to_odd));
-    let real = from_even.times(&to_even).plus(1, 1, &from_odd.times(&to_odd));
-    match (imaginary.signs_at_positive_roots(&Polynomial::one()), imaginary.signs_at_positive_roots(&real)) {
-        (Some(roots), Some(positive)) => roots == positive,
-        _ => false,
+    for (i, x) in part(from, 0).iter().enumerate() {
+        for (j, y) in part(to, 0).iter().enumerate() {
+            real[i + j] += x * y;
+        }
+        for (j, y) in part(to, 1).iter().enumerate() {
+            imaginary[i + j] -= x * y;
+        }
     }
+    for (i, x) in part(from, 1).iter().enumerate() {
+        for (j, y) in part(to, 0).iter().enumerate() {
+            imaginary[i + j] += x * y;
+        }
+        for (j, y) in part(to, 1).iter().enumerate() {
+            real[i + j + 1] += x * y;
+        }
+    }
+    positive_or_other_not_zero(bernstein(&real), bernstein(&imaginary))
+}
+
+/// The Bernstein coefficients on `t` in [0, 1] of a polynomial in `y = t/(1 - t)`, y >= 0, times a positive number.
+fn bernstein(p: &[BigInt]) -> Vec<BigInt> {
+    let mut factorials = vec![BigInt::one()];
+    for k in 1..p.len() {
+        factorials.push(&factorials[k - 1] * k);
+    }
+    p.iter().zip(factorials.iter().zip(factorials.iter().rev())).map(|(c, (low, high))| c * low * high).collect()
+}
+
+/// Whether at every t in [0, 1] the first polynomial is positive or the second is not 0, both by their Bernstein coefficients.
+///
+/// Coefficients of one sign leave no root; an interval without such a sign is halved. A `false` says only that this was not shown.
+fn positive_or_other_not_zero(first: Vec<BigInt>, second: Vec<BigInt>) -> bool {
+    const MOST_INTERVALS: usize = 4096;
+    const MOST_HALVINGS: usize = 100;
+    let mut open = vec![(0, first, second)];
+    for _ in 0..MOST_INTERVALS {
+        let Some((halvings, first, second)) = open.pop() else { return true };
+        if first.iter().all(Signed::is_positive)
+            || second.iter().all(Signed::is_positive)
+            || second.iter().all(Signed::is_negative)
+        {
+            continue;
+        }
+        // At a common root, or where the first is not positive and the second 0, halving would never end.
+        if halvings == MOST_HALVINGS {
+            return false;
+        }
+        let ([first_left, first_right], [second_left, second_right]) = (halves(first), halves(second));
+        open.push((halvings + 1, first_left, second_left));
+        open.push((halvings + 1, first_right, second_right));
+    }
+    false
+}
+
+/// The Bernstein coefficients on the two halves of the interval, times a positive number: de Casteljau's scheme without its divisions.
+fn halves(mut b: Vec<BigInt>) -> [Vec<BigInt>; 2] {
+    let order = b.len().saturating_sub(1);
+    let mut left = Vec::with_capacity(b.len());
+    let mut right = Vec::with_capacity(b.len());
+    for level in 0..=order {
+        // After so many sums, the ends are 2^level times the coefficients.
+        left.push(&b[0] << (order - level));
+        right.push(&b[order - level] << (order - level));
+        for k in 0..order - level {
+            let (sums, rest) = b.split_at_mut(k + 1);
+            sums[k] += &rest[0];
+        }
+    }
+    right.reverse();
+    [left, right].map(|mut half| {
+        let twos = half.iter().filter_map(BigInt::trailing_zeros).min().unwrap_or(0);
+        for c in &mut half {
+            *c >>= twos;
+        }
+        half
+    })
 }
 
 /// `(1 - w)^n p((1 + w)/(1 - w))` for p of degree n in z, coefficients from the highest power down: p has all roots inside the unit

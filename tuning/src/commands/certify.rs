@@ -1,9 +1,9 @@
 //! `autotune certify`: claims about given gains on a family of plants.
 
-use certune::certify::{Claims, FamilyValues};
+use certune::certify::FamilyValues;
 use certune::closed_loop::PlantBox;
 use certune::dynamics::{Link, Robot, for_joint_count};
-use certune::verify::Certificate;
+use certune::verify::{Certificate, ClaimKind};
 use certune::{ArmCertifier, certificate_text, family_of};
 use serde::Serialize;
 
@@ -104,9 +104,9 @@ fn certificate<const N: usize>(
     let table = gains.aic("certify")?;
     let gains = gains.aic_gains::<N>(table, STEP_S)?;
     let claims = match claim {
-        ClaimName::Exponential => Claims::Exponential,
-        ClaimName::Region => Claims::Region,
-        ClaimName::All => Claims::All,
+        ClaimName::Exponential => &[ClaimKind::Exponential][..],
+        ClaimName::Region => &[ClaimKind::Region],
+        ClaimName::All => &[ClaimKind::Exponential, ClaimKind::Region],
     };
     let progress = Terminal::new(context.verbose);
     progress.begin("sampling the arm's constants");

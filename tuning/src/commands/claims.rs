@@ -14,10 +14,18 @@ pub struct ClaimSummary {
     pub kind: &'static str,
     pub verdict: &'static str,
     pub grade: Option<&'static str>,
-    pub rate_per_s: Option<f64>,
-    pub radius_rad: Option<f64>,
+    /// The claim's figures, the most telling first.
+    pub figures: Vec<FigureSummary>,
     pub statement: String,
     pub inequalities: Vec<InequalitySummary>,
+}
+
+/// One figure for `--json`.
+#[derive(Debug, Serialize)]
+pub struct FigureSummary {
+    pub name: &'static str,
+    pub value: f64,
+    pub unit: &'static str,
 }
 
 /// One matrix inequality for `--json`.
@@ -59,26 +67,25 @@ pub fn verdict_word(verdict: Verdict) -> &'static str {
 /// Every claim of a certificate.
 pub fn summaries(certificate: &Certificate) -> Vec<ClaimSummary> {
     let claims = certificate.document().claims.iter().zip(certificate.checked());
-    claims.map(|(claim, checked)| summary(claim, checked)).collect()
+    claims.map(|(entry, checked)| summary(&entry.claim, checked)).collect()
 }
 
 fn summary(claim: &Claim, checked: &Checked) -> ClaimSummary {
-    let (rate_per_s, radius_rad) = match claim {
-        Claim::Exponential(claim) => (Some(claim.rate_per_s.to_f64()), None),
-        Claim::Region(claim) => (Some(claim.rate_per_s.to_f64()), Some(claim.radius_rad.to_f64())),
-        Claim::Refused(_) | Claim::NotProved(_) => (None, None),
-    };
+    let figures = claim.figures().into_iter().map(|figure| FigureSummary {
+        name: figure.name,
+        value: figure.value.to_f64(),
+        unit: figure.unit,
+    });
     let inequalities = checked.inequalities.iter().map(|inequality| InequalitySummary {
         name: inequality.name.clone(),
         order: inequality.order,
         smallest_pivot: inequality.smallest_pivot.as_ref().and_then(ToPrimitive::to_f64),
     });
     ClaimSummary {
-        kind: checked.kind,
+        kind: checked.kind.name(),
         verdict: verdict_word(checked.verdict),
         grade: checked.grade.map(grade_word),
-        rate_per_s,
-        radius_rad,
+        figures: figures.collect(),
         statement: checked.statement.clone(),
         inequalities: inequalities.collect(),
     }
@@ -93,10 +100,8 @@ pub fn claims_in_words(certificate: &Certificate, in_detail: bool) -> String {
         if let Some(grade) = claim.grade {
             let _ = write!(text, " ({grade})");
         }
-        if let Some(radius) = claim.radius_rad {
-            let _ = write!(text, ", radius {radius} rad");
-        } else if let Some(rate) = claim.rate_per_s {
-            let _ = write!(text, ", rate {rate} /s");
+        if let Some(figure) = claim.figures.first() {
+            let _ = write!(text, ", {} {} {}", figure.name, figure.value, figure.unit);
         }
         let _ = writeln!(text);
         text.push_str(&wrapped(&claim.statement, 2));

@@ -51,7 +51,7 @@ fn check(path: &Path, context: Context) -> Result<(Exit, FileSummary), Error> {
         assumptions: Vec::new(),
     };
     let read = output::read_file(path)
-        .and_then(|text| verify(&text).map_err(|source| Error::Certificate { path: path.to_path_buf(), source }));
+        .and_then(|text| verify(&text, &[]).map_err(|source| Error::Certificate { path: path.to_path_buf(), source }));
     match read {
         Err(error) => {
             output::say(&error.in_full());

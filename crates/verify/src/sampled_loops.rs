@@ -1,4 +1,4 @@
-//! Claim `sampled`: every linearised loop of a box decays when the controller runs as it is coded, in steps of h, with a delayed torque.
+//! The linearised loops with the controller as it is coded, in steps of h, with a delayed torque.
 //!
 //! The controller takes its own Euler step (`x+ = F x + G y`, `y = (e, dq)`, torque from the *new* beliefs); the torque of a sample is held for
 //! one period and acts after a constant delay. Two plants:
@@ -26,9 +26,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::aic::AicGains;
 use crate::algebra::resolvent;
-use crate::error::Rejection;
-use crate::exponential::{LoopBox, in_words};
-use crate::number::{Number, positive, ratio};
+use crate::claims::{LoopBox, in_words};
+use crate::error::Flaw;
+use crate::number::{Number, positive, ratio, unit_interval};
 use crate::polytope::{AffineFamily, moebius};
 
 /// No claim speaks of a longer delay: the polynomials' degree grows with it.
@@ -58,14 +58,10 @@ impl SampledFamily {
     /// The loops of these gains at a sampling period in s.
     ///
     /// # Errors
-    /// [`Rejection`] when a gain is missing, not positive, or not the same on every joint, or the period is not positive.
-    pub fn new(gains: &AicGains, period: &Number) -> Result<Self, Rejection> {
+    /// [`Flaw`] when a gain is missing, not positive, or not the same on every joint, or the period is not positive.
+    pub fn new(gains: &AicGains, period: &Number) -> Result<Self, Flaw> {
         if !positive(period.value()) {
-            return Err(Rejection::Quantity {
-                quantity: "period_s",
-                value: period.to_string(),
-                expected: "a positive number",
-            });
+            return Err(Flaw::quantity("period_s", &period.to_string(), "a positive number"));
         }
         let matrices = gains.shared(gains.kappa_mu.len())?.sampled(period.value());
         let (characteristic, adjugate) = resolvent(&matrices.f.map(Vec::from).to_vec());
@@ -74,7 +70,12 @@ impl SampledFamily {
                 |part: &Vec<Vec<BigRational>>| part[3].iter().zip(&matrices.g).map(|(x, g)| x * &g[input]).sum();
             adjugate.iter().map(row_times_column).collect()
         };
-        Ok(Self { period: period.value().clone(), characteristic, by_position: numerator(0), by_velocity: numerator(1) })
+        Ok(Self {
+            period: period.value().clone(),
+            characteristic,
+            by_position: numerator(0),
+            by_velocity: numerator(1),
+        })
     }
 
     /// The polynomials with k whole samples of delay, after `z -> (1 - rate h) z` and the map to w: parameters (m, d, g), or
@@ -135,46 +136,64 @@ impl SampledFamily {
         delay: &BigRational,
         rate: &BigRational,
     ) -> Result<(), String> {
-        if !positive(range.inertia[0].value()) {
-            return Err("the box reaches inertia 0, where the degree drops".to_owned());
-        }
-        if rate < &BigRational::zero() || !positive(&(BigRational::one() - rate * &self.period)) {
-            return Err("the rate is not within [0, 1/period)".to_owned());
-        }
         let whole = delay.trunc().to_usize().filter(|&k| k <= MOST_DELAY_SAMPLES && delay >= &BigRational::zero());
         let Some(whole) = whole else {
             return Err(format!("the delay is not within [0, {MOST_DELAY_SAMPLES}] samples"));
         };
         let rest = delay.fract();
-        match plant {
+        // The exact hold at delays from k to k + 1 for each k that there is, and the rest; the semi-implicit plant at each k.
+        let pieces = (0..whole)
+            .map(|k| (k, if plant == Plant::ZeroOrderHold { BigRational::one() } else { BigRational::zero() }));
+        pieces
+            .chain([(whole, rest)])
+            .try_for_each(|(k, fraction)| self.decays_between(plant, range, k, &fraction, rate))
+    }
+
+    /// As [`SampledFamily::decays_on`], at delays from k to k + `fraction` samples only.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn decays_between(
+        &self,
+        plant: Plant,
+        range: &LoopBox,
+        k: usize,
+        fraction: &BigRational,
+        rate: &BigRational,
+    ) -> Result<(), String> {
+        if !positive(range.inertia[0].value()) {
+            return Err("the box reaches inertia 0, where the degree drops".to_owned());
+        }
+        if range.friction[0].value() < &BigRational::zero() || range.inertia[1].value() < range.inertia[0].value() {
+            return Err("the box is empty or its friction negative".to_owned());
+        }
+        if rate < &BigRational::zero() || !positive(&(BigRational::one() - rate * &self.period)) {
+            return Err("the rate is not within [0, 1/period)".to_owned());
+        }
+        if !unit_interval(fraction) || k > MOST_DELAY_SAMPLES {
+            return Err(format!("the delay is not within [0, {MOST_DELAY_SAMPLES}] samples"));
+        }
+        let polynomials = self.polynomials(plant, k, rate);
+        let (ranges, axes) = match plant {
             Plant::SemiImplicit => {
-                if !rest.is_zero() {
+                if !fraction.is_zero() {
                     return Err("the semi-implicit plant knows whole samples of delay only".to_owned());
                 }
-                let ranges = [&range.inertia, &range.friction, &range.stiffness].map(values);
-                (0..=whole).try_for_each(|k| {
-                    let polynomials = self.polynomials(plant, k, rate);
-                    let axes = ["inertia", "friction", "stiffness"];
-                    polynomials.is_hurwitz_on(&ranges).map_err(|flaw| at_delay(k, &in_words(flaw, &axes)))
-                })
+                let ranges = [&range.inertia, &range.friction, &range.stiffness].map(values).to_vec();
+                (ranges, ["inertia", "friction", "stiffness"].as_slice())
             }
             Plant::ZeroOrderHold => {
                 if range.stiffness.iter().any(|end| !end.value().is_zero()) {
                     return Err("the exact hold is proved with gravity compensated only".to_owned());
                 }
-                // Delays from k to k + fraction, for each k that there is.
-                let mut pieces: Vec<(usize, BigRational)> = (0..whole).map(|k| (k, BigRational::one())).collect();
-                if pieces.is_empty() || !rest.is_zero() {
-                    pieces.push((whole, rest));
-                }
-                pieces.into_iter().try_for_each(|(k, fraction)| {
-                    let ranges = exact_hold_ranges(range, &self.period, &fraction);
-                    let polynomials = self.polynomials(plant, k, rate);
-                    let axes = ["inertia", "friction", "the hold", "delay", "delay", "delay"];
-                    polynomials.is_hurwitz_on(&ranges).map_err(|flaw| at_delay(k, &in_words(flaw, &axes)))
-                })
+                (
+                    exact_hold_ranges(range, &self.period, fraction).to_vec(),
+                    ["inertia", "friction", "the hold"].as_slice(),
+                )
             }
-        }
+        };
+        let after = |flaw| format!("with {k} samples of delay: {}", in_words(flaw, axes));
+        polynomials.is_hurwitz_on(&ranges).map_err(after)
     }
 
     /// Whether the loop at (inertia, friction, stiffness) with k samples of delay is shown *not* to decay faster than `exp(-rate t)`.
@@ -190,16 +209,10 @@ impl SampledFamily {
             Plant::SemiImplicit => !self.polynomials(plant, k, rate).is_hurwitz_at(&point),
             Plant::ZeroOrderHold => {
                 g.is_zero()
-                    && self
-                        .polynomials(plant, k, rate)
-                        .is_nowhere_hurwitz_on(&exact_hold_at(m, d, &self.period))
+                    && self.polynomials(plant, k, rate).is_nowhere_hurwitz_on(&exact_hold_at(m, d, &self.period))
             }
         }
     }
-}
-
-fn at_delay(k: usize, reason: &str) -> String {
-    format!("with {k} samples of delay: {reason}")
 }
 
 fn values(ends: &[Number; 2]) -> [BigRational; 2] {

@@ -11,14 +11,75 @@
 //! `s -> s - rate`. The full derivation, with the case `v = 0`, is in `proofs/claims/exponential.md`.
 
 use num_rational::BigRational;
+use num_traits::Zero;
+use serde::{Deserialize, Serialize};
 
+use super::variation::{Variation, stays_stable, varied};
+use super::{CONTINUOUS, ClaimKind, Figure, Inequality, Provable};
 use crate::aic::{AicGains, SharedGains};
 use crate::algebra::{characteristic_polynomial, zeros};
-use crate::error::Rejection;
+use crate::document::Document;
+use crate::error::Flaw;
 use crate::number::{Number, positive};
 use crate::polytope::{AffineFamily, BoxFlaw};
+use crate::quantity::require_positive;
 
 const DEGREE: usize = 6;
+
+/// Every linearised loop of the family decays at a rate.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExponentialClaim {
+    /// Certified decay rate, 1/s.
+    pub rate_per_s: Number,
+    /// How far single bounds of the family may be moved before stability is no longer certified.
+    pub margins: Vec<Variation>,
+}
+
+impl Provable for ExponentialClaim {
+    fn kind(&self) -> ClaimKind {
+        ClaimKind::Exponential
+    }
+
+    fn sentence(&self, _: &Document) -> String {
+        format!(
+            "linearised at rest at any configuration, the loop is exponentially stable, every mode decaying faster than exp(-{} t), t in s{}",
+            self.rate_per_s,
+            stays_stable(&self.margins)
+        )
+    }
+
+    fn scope(&self, _: &Document) -> String {
+        CONTINUOUS.to_owned()
+    }
+
+    fn figures(&self) -> Vec<Figure> {
+        let rate = Figure { name: "rate", value: self.rate_per_s.clone(), unit: "1/s" };
+        std::iter::once(rate).chain(self.margins.iter().map(Variation::figure)).collect()
+    }
+
+    fn prove(&self, document: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
+        require_positive("rate_per_s", &self.rate_per_s)?;
+        let loops = LoopFamily::new(document.gains.aic()?)?;
+        let decays = |range: &LoopBox, rate: &BigRational| {
+            loops.decays_on(range, rate).map_err(|reason| Flaw::Polynomial { reason })
+        };
+        decays(&family_box(document), self.rate_per_s.value())?;
+        varied(document, &self.margins, &|range| decays(range, &BigRational::zero()))?;
+        Ok(Vec::new())
+    }
+}
+
+/// The box of linearised loops that the family's constants span.
+pub fn family_box(document: &Document) -> LoopBox {
+    let bounds = &document.constants.bounds;
+    let stiffness = if document.family.gravity_compensation { Number::zero() } else { bounds.k_g_n_m_per_rad.clone() };
+    LoopBox {
+        inertia: [bounds.m_lo_kg_m2.clone(), bounds.m_hi_kg_m2.clone()],
+        friction: document.family.friction_hull(),
+        stiffness: [stiffness.negated(), stiffness],
+    }
+}
 
 /// Ranges of inertia (kg m^2), viscous friction (N m s/rad) and gravity stiffness (N m/rad), each `[lower, upper]`.
 #[derive(Clone, Debug, PartialEq)]
@@ -50,8 +111,8 @@ impl LoopFamily {
     /// The loops of these gains.
     ///
     /// # Errors
-    /// [`Rejection`] when a gain is missing, not positive, or not the same on every joint.
-    pub fn new(gains: &AicGains) -> Result<Self, Rejection> {
+    /// [`Flaw`] when a gain is missing, not positive, or not the same on every joint.
+    pub fn new(gains: &AicGains) -> Result<Self, Flaw> {
         let shared = gains.shared(gains.kappa_mu.len())?;
         let at = |m: i64, d: i64, g: i64| polynomial(&shared, [m, d, g].map(|x| BigRational::from_integer(x.into())));
         let minus = |x: &[BigRational], y: &[BigRational]| x.iter().zip(y).map(|(x, y)| x - y).collect::<Vec<_>>();
@@ -90,7 +151,8 @@ impl LoopFamily {
         if !positive(range.inertia[0].value()) {
             return Err("the box reaches inertia 0, where the degree drops".to_owned());
         }
-        let ranges = [&range.inertia, &range.friction, &range.stiffness].map(|ends| ends.each_ref().map(|x| x.value().clone()));
+        let ranges =
+            [&range.inertia, &range.friction, &range.stiffness].map(|ends| ends.each_ref().map(|x| x.value().clone()));
         self.shifted(rate).is_hurwitz_on(&ranges).map_err(|flaw| in_words(flaw, &["inertia", "friction", "stiffness"]))
     }
 }
