@@ -1,8 +1,8 @@
 //! The largest certified decay rate of the linearised loops, or a point of the box that contradicts stability.
 
 use certune_verify::{
-    Attained, BoxPoint, Claim, ClaimKind, Document, ExponentialClaim, LoopBox, LoopFamily, NotProvedClaim, Number,
-    Reason, RefusedClaim, Sampling, family_box,
+    Attained, BoxPoint, Claim, ClaimKind, Document, ExponentialClaim, LoopBox, LoopFamily, LoopTiming, NotProvedClaim,
+    Number, Reason, RefusedClaim, family_box,
 };
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -102,7 +102,7 @@ fn refuse(document: &Document, loops: &LoopFamily, range: &LoopBox, attain: &Att
 }
 
 /// Searches an arm and configuration of the family with an unstable linearised loop, in continuous time or sampled.
-pub type Attain<'a> = dyn Fn(Option<&Sampling>) -> Option<(UnstableLoop, Attained)> + 'a;
+pub type Attain<'a> = dyn Fn(Option<&LoopTiming>) -> Option<(UnstableLoop, Attained)> + 'a;
 
 /// A point of the box that fails: the one of an arm that was found, else one of a grid.
 pub(crate) fn counterexample(

@@ -11,25 +11,35 @@
 //! | `sampled` | decay rate and delay margin of the sampled linearised loops, or a counterexample |
 //! | `margins` | how far a bound of the family may, or must, be moved |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
+//! | `moving_goal` | the fastest goal that a region allows |
+//! | `sampled_region` | the same of the sampled nonlinear loop |
+//! | `adaptive` | convergence, the frozen loop and the sampled velocity loop of the adaptive controller |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
 #![forbid(unsafe_code)]
 
+mod adaptive;
 mod exponential;
 mod lmi;
 mod margins;
+mod moving_goal;
 mod problem;
 mod region;
 mod sampled;
+mod sampled_region;
 
+pub use adaptive::{adaptive_convergence, adaptive_sampled, pi_exponential};
 pub use exponential::{Attain, UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
+pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal};
 pub use problem::{
-    AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, ProblemError, SampledConstantValues, arm_ranges,
+    AicGainValues, ArmValues, ConstantValues, EnclosureValues, FamilyValues, MracGainValues, Problem, ProblemError,
+    SampledConstantValues, arm_ranges,
 };
 pub use region::{RegionOptions, region};
 pub use sampled::{SampledOptions, light_inertia_rule_s, sampled};
+pub use sampled_region::{SampledRegionOptions, sampled_region};
 
 use certune_verify::{
     Certificate, Claim, ClaimKind, Document, NotProvedClaim, Number, Reason, Rejection, seal, verify,
@@ -50,12 +60,16 @@ pub enum CertifyError {
 }
 
 /// How each kind of claim is searched.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// The region of the nonlinear loop.
     pub region: RegionOptions,
     /// The sampled loop.
     pub sampled: SampledOptions,
+    /// The goal that moves.
+    pub moving_goal: MovingGoalOptions,
+    /// The region of the sampled nonlinear loop.
+    pub sampled_region: SampledRegionOptions,
 }
 
 /// Makes the claims about a problem, in the order asked for, and has them checked.
@@ -73,13 +87,15 @@ pub fn certify(
 ) -> Result<Certificate, CertifyError> {
     let mut document = problem.document().clone();
     for kind in claims {
-        let claim = match kind {
-            ClaimKind::Exponential => exponential(problem, attain),
-            ClaimKind::Sampled => sampled(problem, &options.sampled, attain),
-            ClaimKind::Region => region(problem, &options.region),
-            other => not_proved(*other, Reason::FamilyNotCovered, None),
+        let made = match kind {
+            ClaimKind::Exponential => vec![exponential(problem, attain)],
+            ClaimKind::Sampled => vec![sampled(problem, &options.sampled, attain)],
+            ClaimKind::Region => vec![region(problem, &options.region)],
+            ClaimKind::MovingGoal => moving_goal(problem, &document, &options.moving_goal),
+            ClaimKind::SampledRegion => vec![sampled_region(problem, &options.sampled_region)],
+            other => vec![not_proved(*other, Reason::FamilyNotCovered, None)],
         };
-        document.claims.push(claim.into());
+        document.claims.extend(made.into_iter().map(Into::into));
     }
     let document = seal(document);
     Ok(verify(&to_json(&document)?, problem.records())??)

@@ -1,8 +1,8 @@
 //! The linearised loops with a sampled controller: decay rate, delay margin, margins; or a point that contradicts stability.
 
 use certune_verify::{
-    BoxPoint, Claim, ClaimKind, LoopBox, MOST_DELAY_SAMPLES, NotProvedClaim, Number, Plant, Reason, RefusedClaim,
-    SampledClaim, SampledFamily, Sampling, family_box,
+    BoxPoint, Claim, ClaimKind, LoopBox, LoopTiming, MOST_DELAY_SAMPLES, NotProvedClaim, Number, PlantStep, Reason,
+    RefusedClaim, SampledClaim, SampledFamily, family_box,
 };
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -18,7 +18,7 @@ const PARTS: usize = 100;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledOptions {
     /// How the arm moves between two samples.
-    pub plant: Plant,
+    pub plant: PlantStep,
     /// The controller's period, s.
     pub period_s: f64,
     /// Samples of delay up to which the claim must hold.
@@ -28,7 +28,7 @@ pub struct SampledOptions {
 impl Default for SampledOptions {
     /// The simulator's step at 1 kHz, without delay.
     fn default() -> Self {
-        Self { plant: Plant::SemiImplicit, period_s: 1e-3, delay_samples: 0 }
+        Self { plant: PlantStep::SemiImplicit, period_s: 1e-3, delay_samples: 0 }
     }
 }
 
@@ -41,7 +41,7 @@ pub fn sampled(problem: &Problem, options: &SampledOptions, attain: &Attain<'_>)
     let Some(period_s) = Number::decimal(options.period_s) else { return unwritable() };
     let samples = |parts: usize| BigRational::new(parts.into(), PARTS.into());
     let Some(delay_s) = delay(&period_s, &samples(options.delay_samples * PARTS)) else { return unwritable() };
-    let sampling = Sampling { plant: options.plant, period_s, delay_s };
+    let sampling = LoopTiming { plant: options.plant, period_s, delay_s };
     let not_proved = |reason, remedies| {
         Claim::NotProved(NotProvedClaim {
             of: ClaimKind::Sampled,
@@ -58,7 +58,7 @@ pub fn sampled(problem: &Problem, options: &SampledOptions, attain: &Attain<'_>)
     let Ok(loops) = SampledFamily::new(gains, &sampling.period_s) else {
         return not_proved(Reason::OutOfRange, Vec::new());
     };
-    let exact_hold = options.plant == Plant::ZeroOrderHold;
+    let exact_hold = options.plant == PlantStep::ZeroOrderHold;
     if exact_hold && !document.family.gravity_compensation {
         return not_proved(Reason::FamilyNotCovered, Vec::new());
     }
@@ -116,7 +116,7 @@ fn delay(period_s: &Number, samples: &BigRational) -> Option<Number> {
 }
 
 fn refuse(
-    sampling: &Sampling,
+    sampling: &LoopTiming,
     options: &SampledOptions,
     loops: &SampledFamily,
     range: &LoopBox,
@@ -128,7 +128,7 @@ fn refuse(
     // The longest delay is the likeliest to fail; a refusal names the very delay at which its loop does.
     for k in (0..=options.delay_samples).rev() {
         let delay_s = delay(&sampling.period_s, &BigRational::from_integer(k.into())).ok_or(Reason::OutOfRange)?;
-        let at = Sampling { delay_s, ..sampling.clone() };
+        let at = LoopTiming { delay_s, ..sampling.clone() };
         let fails = |point: &BoxPoint| loops.fails_at(options.plant, coordinates(point), k, &zero);
         match counterexample(range, attain(Some(&at)), &fails) {
             Ok((point, attained)) => {

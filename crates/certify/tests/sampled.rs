@@ -11,7 +11,9 @@ use certune_certify::{
 };
 use certune_control::aic::{AicGains, AicParams};
 use certune_linsys::Loop;
-use certune_verify::{Certificate, Claim, ClaimKind, LoopBox, Number, Plant, Quantity, SampledFamily, Verdict};
+use certune_verify::{
+    Certificate, Claim, ClaimKind, LoopBox, LoopFamily, Number, PlantStep, Quantity, SampledFamily, Verdict,
+};
 use nalgebra::DMatrix;
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -93,7 +95,7 @@ fn held(m: f64, d: f64, t: f64) -> ([[f64; 2]; 2], [f64; 2]) {
 }
 
 /// The loop of one joint; `delay` in samples. States e, dq, m, mu', mu'', u~, older torques.
-fn spectral_radius(gains: &Gains, plant: Plant, [m, d, g]: [f64; 3], delay: f64) -> f64 {
+fn spectral_radius(gains: &Gains, plant: PlantStep, [m, d, g]: [f64; 3], delay: f64) -> f64 {
     let [kappa_mu, kappa_a, sigma_q, sigma_dq, sigma_mu, sigma_dmu, time] = gains.map(|x| [x]);
     let gains =
         AicGains::<1> { kappa_mu, kappa_a, sigma_q, sigma_dq, sigma_mu, sigma_dmu, reference_time_constant_s: time };
@@ -116,7 +118,7 @@ fn spectral_radius(gains: &Gains, plant: Plant, [m, d, g]: [f64; 3], delay: f64)
     // After the update, the torque of j samples ago is state 5 + j.
     let mut step = DMatrix::<f64>::identity(order, order);
     match plant {
-        Plant::SemiImplicit => {
+        PlantStep::SemiImplicit => {
             let h = STEP_S;
             let dq = [-h * g / m, 1.0 - h * d / m, h / m];
             for (column, x) in [0, 1, 5 + k].into_iter().zip(dq) {
@@ -124,7 +126,7 @@ fn spectral_radius(gains: &Gains, plant: Plant, [m, d, g]: [f64; 3], delay: f64)
                 step[(0, column)] = h * x + if column == 0 { 1.0 } else { 0.0 };
             }
         }
-        Plant::ZeroOrderHold => {
+        PlantStep::ZeroOrderHold => {
             let mut flow = DMatrix::<f64>::identity(order, order);
             for (t, torque) in [(fraction * STEP_S, 6 + k), ((1.0 - fraction) * STEP_S, 5 + k)] {
                 let (p, b) = held(m, d, t);
@@ -157,8 +159,8 @@ fn ten_thousand_loops_agree_with_their_eigenvalues() {
         let gains = random_gains(&mut rng);
         let m = sized(&mut rng, 1e-3, 10.0);
         let d = if index % 3 == 0 { 0.0 } else { sized(&mut rng, 0.01, 5.0) };
-        let plant = if index % 2 == 0 { Plant::SemiImplicit } else { Plant::ZeroOrderHold };
-        let g = if plant == Plant::SemiImplicit { three_digits(uniform(&mut rng, -70.0, 70.0)) } else { 0.0 };
+        let plant = if index % 2 == 0 { PlantStep::SemiImplicit } else { PlantStep::ZeroOrderHold };
+        let g = if plant == PlantStep::SemiImplicit { three_digits(uniform(&mut rng, -70.0, 70.0)) } else { 0.0 };
         let k = usize::try_from(rng.next_u64() % 5).unwrap();
         let loops = family(&gains);
         let range = loop_box([m, m], [d, d], [g, g]);
@@ -191,9 +193,9 @@ fn no_point_of_a_certified_box_is_slower_than_its_rate() {
         let m = [m0, three_digits(m0 * uniform(&mut rng, 1.0, 30.0))];
         let d0 = if index % 3 == 0 { 0.0 } else { sized(&mut rng, 0.01, 5.0) };
         let d = [d0, three_digits(d0 + uniform(&mut rng, 0.0, 2.0))];
-        let plant = if index % 2 == 0 { Plant::SemiImplicit } else { Plant::ZeroOrderHold };
-        let g = if plant == Plant::SemiImplicit { three_digits(uniform(&mut rng, 0.0, 60.0)) } else { 0.0 };
-        let delay = if plant == Plant::SemiImplicit {
+        let plant = if index % 2 == 0 { PlantStep::SemiImplicit } else { PlantStep::ZeroOrderHold };
+        let g = if plant == PlantStep::SemiImplicit { three_digits(uniform(&mut rng, 0.0, 60.0)) } else { 0.0 };
+        let delay = if plant == PlantStep::SemiImplicit {
             (rng.next_u64() % 3) as f64
         } else {
             three_digits(uniform(&mut rng, 0.0, 2.5))
@@ -214,7 +216,7 @@ fn no_point_of_a_certified_box_is_slower_than_its_rate() {
                 inside([-g, g], share(&mut rng)),
             ];
             let late = delay * share(&mut rng);
-            let late = if plant == Plant::SemiImplicit { late.round() } else { late };
+            let late = if plant == PlantStep::SemiImplicit { late.round() } else { late };
             let radius = spectral_radius(&gains, plant, at, late);
             let bound = (-rate * STEP_S).exp();
             assert!(radius < bound + RADIUS_SLACK, "{gains:?} {plant:?} {at:?} {late}: {radius} against {bound}");
@@ -259,7 +261,7 @@ fn problem(gains: &Gains, compensated: bool, friction: [f64; 2], inertia: [f64; 
     Problem::new(&arm, values.written().unwrap(), &family, &ConstantValues::Sampled(constants)).unwrap()
 }
 
-fn claim(problem: &Problem, plant: Plant, delay_samples: usize) -> Certificate {
+fn claim(problem: &Problem, plant: PlantStep, delay_samples: usize) -> Certificate {
     let options = Options { sampled: SampledOptions { plant, period_s: STEP_S, delay_samples }, ..Options::default() };
     certify(problem, &[ClaimKind::Sampled], &options, &|_| None).unwrap()
 }
@@ -276,7 +278,7 @@ fn delay_margin_ms(certificate: &Certificate) -> f64 {
 /// The bare wrist against one sample of delay: friction or rotor inertia is needed, and the refusal says how much.
 #[test]
 fn a_refusal_names_the_friction_and_the_rotor_inertia_that_are_needed() {
-    for plant in [Plant::SemiImplicit, Plant::ZeroOrderHold] {
+    for plant in [PlantStep::SemiImplicit, PlantStep::ZeroOrderHold] {
         let bare = problem(&PUBLISHED, true, [0.0, 0.0], BARE, 69.0);
         let refused = claim(&bare, plant, 1);
         println!("{}", refused.checked()[0].statement);
@@ -302,31 +304,96 @@ fn delay_margins_of_the_published_gains() {
     {
         let problem = problem(&with_kappa_a(kappa_a), compensated, [d, 3.0], BARE, 69.0);
         let start = std::time::Instant::now();
-        let certificate = claim(&problem, Plant::SemiImplicit, 0);
+        let certificate = claim(&problem, PlantStep::SemiImplicit, 0);
         println!("{} s: {}", start.elapsed().as_secs_f64(), certificate.checked()[0].statement);
         let margin = delay_margin_ms(&certificate);
         assert!((least_ms..=most_ms).contains(&margin), "{margin}");
         let rule = light_inertia_rule_s(&problem).unwrap() * 1e3;
         assert!((rule.floor() - margin).abs() <= 1.0, "rule {rule} ms, certified {margin} ms");
         if compensated {
-            let exact = claim(&problem, Plant::ZeroOrderHold, 0);
+            let exact = claim(&problem, PlantStep::ZeroOrderHold, 0);
             println!("{}", exact.checked()[0].statement);
             let fine = delay_margin_ms(&exact);
-            assert!((fine - rule).abs() <= 0.1 * rule, "rule {rule} ms, certified {fine} ms");
+            // The rule is of first order in the delay: low by 5 % at 1.5 ms, by 17 % at 6 ms.
+            assert!((rule..1.25 * rule).contains(&fine), "rule {rule} ms, certified {fine} ms");
+            let text = certune_certify::to_json(exact.document()).unwrap();
+            let start = std::time::Instant::now();
+            assert!(certune_verify::verify(&text, &[]).unwrap().unwrap().all_hold());
+            println!("verified in {} s", start.elapsed().as_secs_f64());
             // Beyond the margin, a whole sample and a hair, some loop of the family is unstable.
             let gains = with_kappa_a(kappa_a);
             let worst = (0..=200)
                 .map(|k| BARE[0] * (BARE[1] / BARE[0]).powf(f64::from(k) / 200.0))
-                .map(|m| spectral_radius(&gains, Plant::ZeroOrderHold, [m, d, 0.0], fine + 0.1))
+                .map(|m| spectral_radius(&gains, PlantStep::ZeroOrderHold, [m, d, 0.0], fine + 0.1))
                 .fold(0.0, f64::max);
             assert!(worst > 1.0, "{worst}");
         }
     }
 }
 
+fn continuous(gains: &Gains) -> LoopFamily {
+    let list = |k: usize| vec![number(gains[k])];
+    let gains = certune_verify::AicGains {
+        kappa_mu: list(0),
+        kappa_a: list(1),
+        sigma_q: list(2),
+        sigma_dq: list(3),
+        sigma_mu: list(4),
+        sigma_dmu: list(5),
+        reference_time_constant_s: list(6),
+    };
+    LoopFamily::new(&gains).unwrap()
+}
+
+/// Prediction: kappa_a 700 is stable for every inertia below about 35 kg m^2 without gravity stiffness, 25 at -69 N m/rad, 18 at -117, and so needs no
+/// gravity compensation on any arm that light.
+#[test]
+fn published_gains_carry_inertias_up_to_35_25_and_18() {
+    let (loops, zero) = (continuous(&PUBLISHED), BigRational::zero());
+    for (stiffness, carried, too_heavy) in [(0.0, 34.0, 37.0), (-69.0, 24.0, 27.0), (-117.0, 17.0, 19.5)] {
+        let stable = |heaviest: f64| {
+            loops.decays_on(&loop_box([1e-4, heaviest], [0.0, 0.0], [stiffness, stiffness]), &zero).is_ok()
+        };
+        assert!(stable(carried) && !stable(too_heavy), "{stiffness}");
+    }
+    assert!(loops.decays_on(&loop_box(BARE, [0.0, 0.0], [-69.0, 69.0]), &zero).is_ok(), "no compensation needed");
+    assert!(continuous(&with_kappa_a(200.0)).decays_on(&loop_box(BARE, [0.0, 0.0], [-69.0, 69.0]), &zero).is_err());
+}
+
+/// Prediction: a light inertia without friction needs `kappa_mu sigma_q > sigma_dq^2`, which the published re-tuning of joints 6 and 7 (sigma 20 and 100)
+/// violates and that of joint 5 (sigma 10) just keeps: those joints rely on friction.
+#[test]
+fn light_inertias_need_a_velocity_variance_that_joints_six_and_seven_have_not() {
+    let zero = BigRational::zero();
+    for (sigma, holds) in [(1.0, true), (10.0, true), (20.0, false), (100.0, false)] {
+        let mut gains = with_kappa_a(200.0);
+        (gains[2], gains[3], gains[4], gains[5]) = (sigma, sigma, 15.0, 30.0);
+        let loops = continuous(&gains);
+        let light = samples(1e-4);
+        let stable = |d: f64| loops.is_stable_at([&light, &samples(d), &zero], &zero);
+        assert_eq!(gains[0] * sigma > sigma * sigma, holds);
+        assert_eq!(stable(0.0), holds, "sigma {sigma}");
+        assert!(stable(0.1), "sigma {sigma}");
+    }
+}
+
+/// Prediction: one sample of delay needs about 0.065 kg m^2 without friction, and nothing at 1 N m s/rad.
+#[test]
+fn one_sample_of_delay_needs_inertia_or_friction() {
+    let (loops, zero, one) = (family(&PUBLISHED), BigRational::zero(), samples(1.0));
+    for plant in [PlantStep::SemiImplicit, PlantStep::ZeroOrderHold] {
+        let stable = |lightest: f64, d: f64| {
+            loops.decays_on(plant, &loop_box([lightest, 4.66], [d, d], [0.0, 0.0]), &one, &zero).is_ok()
+        };
+        assert!(stable(0.067, 0.0) && !stable(0.063, 0.0), "{plant:?}");
+        assert!(stable(1e-3, 1.0), "{plant:?}");
+        assert!(loops.fails_at(plant, [&samples(0.063), &zero, &zero], 1, &zero));
+    }
+}
+
 #[test]
 fn what_the_claim_does_not_cover_is_said() {
-    let gravity = claim(&problem(&PUBLISHED, false, [1.0, 3.0], BARE, 69.0), Plant::ZeroOrderHold, 0);
+    let gravity = claim(&problem(&PUBLISHED, false, [1.0, 3.0], BARE, 69.0), PlantStep::ZeroOrderHold, 0);
     assert_eq!(gravity.checked()[0].verdict, Verdict::NotProved);
     println!("{}", gravity.checked()[0].statement);
 }

@@ -55,6 +55,8 @@ pub use certune_verify as verify;
 #[doc = include_str!("_docs/architecture.md")]
 pub mod guide {}
 
+mod adaptive;
 mod stability;
 
+pub use adaptive::AdaptiveSetting;
 pub use stability::{ArmCertifier, Effort, StabilityError, certificate_text, family_of, poles_per_s};

@@ -7,18 +7,19 @@ use certune_certify::{
     AicGainValues, ArmValues, CertifyError, ConstantValues, FamilyValues, Options, Problem, ProblemError,
     SampledConstantValues, UnstableLoop, certify, to_json,
 };
-use certune_closed_loop::{PlantBox, PlantError, linearise_aic};
+use certune_closed_loop::{PlantBox, PlantError, linearise_aic, linearise_aic_sampled};
 use certune_control::ParamError;
 use certune_control::aic::{AicGains, AicParams};
 use certune_dynamics::{Model, Payload, Robot, RobotError, gravity_jacobian, mass_matrix};
-use certune_linsys::{Continuous, Joints, Loop, LoopError};
-use certune_verify::{Attained, Certificate, ClaimKind, Number};
+use certune_linsys::{Joints, LoopError};
+use certune_verify::{Attained, Certificate, ClaimKind, Gains, LoopTiming, Number, PlantStep};
 use nalgebra::{Complex, DMatrix, DVector};
+use num_traits::ToPrimitive;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
 /// The controllers' own step, s. Continuous-time claims do not depend on it; parameters are validated with it.
-const STEP_S: f64 = 0.001;
+pub(crate) const STEP_S: f64 = 0.001;
 
 /// Why an arm, a family and gains make no certificate.
 #[derive(Debug, thiserror::Error)]
@@ -73,7 +74,7 @@ pub fn family_of(plant_box: &PlantBox) -> Result<FamilyValues, StabilityError> {
 }
 
 /// How hard a certificate is searched.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Effort {
     /// The search for proofs.
     pub proofs: Options,
@@ -160,10 +161,20 @@ impl<const N: usize> ArmCertifier<N> {
         claims: &[ClaimKind],
         effort: &Effort,
     ) -> Result<Certificate, StabilityError> {
-        let params = AicParams::new(gains, STEP_S)?;
-        let problem = Problem::new(&self.arm, gain_values(gains).written()?, &self.family, &self.constant_values())?;
-        let attain = || self.unstable_member(&params, &effort.counterexample).ok().flatten();
+        let problem = self.problem(gain_values(gains).written()?)?;
+        let attain =
+            |timing: Option<&LoopTiming>| self.unstable_member(gains, timing, &effort.counterexample).ok().flatten();
         Ok(certify(&problem, claims, &effort.proofs, &attain)?)
+    }
+
+    /// The problem of these gains, without claims.
+    pub(crate) fn problem(&self, gains: Gains) -> Result<Problem, StabilityError> {
+        Ok(Problem::new(&self.arm, gains, &self.family, &self.constant_values())?)
+    }
+
+    /// The box of arms.
+    pub(crate) fn members(&self) -> &ArmBox<N> {
+        &self.members
     }
 
     fn constant_values(&self) -> ConstantValues {
@@ -183,17 +194,28 @@ impl<const N: usize> ArmCertifier<N> {
         })
     }
 
-    /// Searches the family for a member, configuration and friction whose linearised loop is unstable.
+    /// Searches the family for a member, configuration and friction whose linearised loop is unstable, in continuous time or with the
+    /// simulator's step; the exact hold is not searched.
     fn unstable_member(
         &self,
-        params: &AicParams<N>,
+        gains: &AicGains<N>,
+        timing: Option<&LoopTiming>,
         options: &SearchOptions,
     ) -> Result<Option<(UnstableLoop, Attained)>, StabilityError> {
+        let time = match timing {
+            None => Time { params: AicParams::new(gains, STEP_S)?, delay_samples: None },
+            Some(timing) => {
+                let samples = timing.delay_samples().to_usize();
+                if timing.plant == PlantStep::ZeroOrderHold || samples.is_none() {
+                    return Ok(None);
+                }
+                Time { params: AicParams::new(gains, timing.period_s.to_f64())?, delay_samples: samples }
+            }
+        };
         let [least, largest] = self.family.friction_n_m_s_per_rad;
         let mut axes = self.members.axes();
         axes.push(Axis::Interval { lower: least, upper: largest });
-        let score =
-            |at: &[f64]| self.member_loop(params, at).map_or(f64::NAN, |found| found.1.spectral_abscissa_per_s());
+        let score = |at: &[f64]| self.member_loop(&time, at).map_or(f64::NAN, |found| found.1.per_s.re);
         let top = maximise(&axes, options, score)?;
         if top.value.is_nan() || top.value <= 0.0 {
             return Ok(None);
@@ -204,33 +226,41 @@ impl<const N: usize> ArmCertifier<N> {
             *angle = (*angle * 1e3).round() / 1e3;
         }
         let at = if score(&short) > 0.0 { short } else { top.at };
-        let (member, closed) = self.member_loop(params, &at)?;
+        let (member, worst) = self.member_loop(&time, &at)?;
         let friction = at.last().copied().unwrap_or_default();
-        Ok(self.describe(&member, &closed, &at, friction))
+        Ok(self.describe(&member, &worst, &at, friction))
     }
 
-    fn member_loop(
-        &self,
-        params: &AicParams<N>,
-        at: &[f64],
-    ) -> Result<(certune_bounds::Member<N>, Loop<Continuous>), StabilityError> {
+    fn member_loop(&self, time: &Time<N>, at: &[f64]) -> Result<(certune_bounds::Member<N>, Mode), StabilityError> {
         let (place, friction) = at.split_at(at.len().saturating_sub(1));
         let mut member = self.members.member(place)?;
         member.model = member.model.with_friction(&Joints::repeat(friction[0]), &Joints::zeros());
-        let closed = linearise_aic(&member.model, &member.q, params, self.family.gravity_compensation)?;
-        Ok((member, closed))
+        let compensated = self.family.gravity_compensation;
+        let mode = match time.delay_samples {
+            None => {
+                let closed = linearise_aic(&member.model, &member.q, &time.params, compensated)?;
+                let eigenvalue = closed.rightmost_eigenvalue();
+                Mode { matrix: closed.matrix().clone(), eigenvalue, per_s: eigenvalue }
+            }
+            Some(samples) => {
+                let closed = linearise_aic_sampled(&member.model, &member.q, &time.params, compensated, samples)?;
+                let outermost = closed.eigenvalues().into_iter().max_by(|x, y| x.norm().total_cmp(&y.norm()));
+                let eigenvalue = outermost.unwrap_or(Complex::new(f64::NAN, f64::NAN));
+                Mode { matrix: closed.matrix().clone(), eigenvalue, per_s: eigenvalue.ln() / time.params.step_s() }
+            }
+        };
+        Ok((member, mode))
     }
 
     /// The eigenvector's one-joint loop, and the member in the certificate's terms.
     fn describe(
         &self,
         member: &certune_bounds::Member<N>,
-        closed: &Loop<Continuous>,
+        mode: &Mode,
         at: &[f64],
         friction: f64,
     ) -> Option<(UnstableLoop, Attained)> {
-        let eigenvalue = closed.rightmost_eigenvalue();
-        let e = eigenvector(closed.matrix(), eigenvalue)?.rows(0, N).into_owned();
+        let e = eigenvector(&mode.matrix, mode.eigenvalue)?.rows(0, N).into_owned();
         let norm_squared = e.norm_squared();
         let form = |matrix: DMatrix<f64>| {
             let product = matrix.map(|x| Complex::new(x, 0.0)) * &e;
@@ -259,10 +289,25 @@ impl<const N: usize> ArmCertifier<N> {
             payload_kg: decimal(payload)?,
             rotor_inertia_kg_m2: decimal(rotor_lower + fraction * (rotor_upper - rotor_lower))?,
             friction_n_m_s_per_rad: decimal(friction)?,
-            eigenvalue_per_s: [four_digits(eigenvalue.re)?, four_digits(eigenvalue.im)?],
+            eigenvalue_per_s: [four_digits(mode.per_s.re)?, four_digits(mode.per_s.im)?],
         };
         found.inertia_kg_m2.is_finite().then_some((found, attained))
     }
+}
+
+/// The controller's step, and its delay when the loop is sampled.
+struct Time<const N: usize> {
+    params: AicParams<N>,
+    delay_samples: Option<usize>,
+}
+
+/// The mode of a linearised loop that grows most.
+struct Mode {
+    matrix: DMatrix<f64>,
+    /// Of the matrix.
+    eigenvalue: Complex<f64>,
+    /// As a rate in continuous time.
+    per_s: Complex<f64>,
 }
 
 /// Four significant digits, of something that only illustrates.

@@ -17,6 +17,7 @@
 //! are mapped by `z = (1 + w)/(1 - w)` first, a linear map of the coefficients. Proofs: `proofs/claims/exponential.md`, `sampled.md`.
 
 use num_bigint::BigInt;
+use num_integer::Integer;
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 
@@ -35,25 +36,38 @@ pub(crate) enum BoxFlaw {
     Edge(usize),
 }
 
-/// The polynomials `parts[0] + sum_j x_j parts[j + 1]`, coefficients from the highest power down, all of one length.
+/// The polynomials `parts[0] + sum_j x_j parts[j + 1]` times a positive number, coefficients from the highest power down, all of one length.
+///
+/// Integers, so that no fraction has to be reduced on the way to a verdict.
 #[derive(Clone, Debug)]
-pub(crate) struct AffineFamily(pub(crate) Vec<Vec<BigRational>>);
+pub(crate) struct AffineFamily(Vec<Vec<BigInt>>);
 
 impl AffineFamily {
+    /// The family of these parts.
+    pub(crate) fn new(parts: &[Vec<BigRational>]) -> Self {
+        Self(common_integers(parts))
+    }
+
     /// The same family under a linear map of its polynomials.
-    pub(crate) fn map(&self, f: impl Fn(&[BigRational]) -> Vec<BigRational>) -> Self {
+    pub(crate) fn map(&self, f: impl Fn(&[BigInt]) -> Vec<BigInt>) -> Self {
         Self(self.0.iter().map(|part| f(part)).collect())
     }
 
-    /// The polynomial at a point.
-    pub(crate) fn at(&self, point: &[&BigRational]) -> Vec<BigRational> {
+    /// A positive multiple of the polynomial at a point: neither its roots nor where a segment to another one meets 0 depend on the multiple.
+    pub(crate) fn at(&self, point: &[&BigRational]) -> Vec<BigInt> {
         let Some((constant, parts)) = self.0.split_first() else { return Vec::new() };
-        let mut p = constant.clone();
+        let denominator = point.iter().fold(BigInt::one(), |lcm, x| lcm.lcm(x.denom()));
+        let mut p: Vec<BigInt> = constant.iter().map(|c| c * &denominator).collect();
         for (part, &x) in parts.iter().zip(point) {
-            if !x.is_zero() {
-                for (sum, c) in p.iter_mut().zip(part) {
-                    *sum += c * x;
-                }
+            let share = x.numer() * (&denominator / x.denom());
+            for (sum, c) in p.iter_mut().zip(part) {
+                *sum += c * &share;
+            }
+        }
+        let content = p.iter().fold(BigInt::zero(), |gcd, c| gcd.gcd(c));
+        if content > BigInt::one() {
+            for c in &mut p {
+                *c = &*c / &content;
             }
         }
         p
@@ -61,7 +75,7 @@ impl AffineFamily {
 
     /// Whether the polynomial at a point is Hurwitz. Exact.
     pub(crate) fn is_hurwitz_at(&self, point: &[&BigRational]) -> bool {
-        common_integers(&[self.at(point)]).iter().all(|p| is_hurwitz(p))
+        is_hurwitz(&self.at(point))
     }
 
     /// Whether every polynomial of the box is Hurwitz. Exact; the leading coefficient must be positive.
@@ -84,7 +98,7 @@ impl AffineFamily {
         unstable && no_root_on_the_axis(&corners, ranges).is_ok()
     }
 
-    /// Corner k has bit j set where axis j is at its upper end. One factor for all: edges join polynomials in their true proportions.
+    /// Corner k has bit j set where axis j is at its upper end.
     fn corners(&self, ranges: &[[BigRational; 2]]) -> Result<Vec<Vec<BigInt>>, BoxFlaw> {
         if ranges.iter().any(|[lower, upper]| lower > upper) {
             return Err(BoxFlaw::Empty);
@@ -93,7 +107,7 @@ impl AffineFamily {
             let point: Vec<&BigRational> = ranges.iter().enumerate().map(|(j, range)| &range[k >> j & 1]).collect();
             self.at(&point)
         };
-        Ok(common_integers(&(0..1_usize << ranges.len()).map(corner).collect::<Vec<_>>()))
+        Ok((0..1_usize << ranges.len()).map(corner).collect())
     }
 }
 
@@ -211,13 +225,13 @@ fn halves(mut b: Vec<BigInt>) -> [Vec<BigInt>; 2] {
 
 /// `(1 - w)^n p((1 + w)/(1 - w))` for p of degree n in z, coefficients from the highest power down: p has all roots inside the unit
 /// circle iff the result, of degree n, is Hurwitz (or minus it is).
-pub(crate) fn moebius(p: &[BigRational]) -> Vec<BigRational> {
+pub(crate) fn moebius(p: &[BigInt]) -> Vec<BigInt> {
     // Horner in z with the powers of (1 - w) carried along: r <- r (1 + w) + c (1 - w)^k.
-    let mut result: Vec<BigRational> = Vec::new();
-    let mut power = vec![BigRational::one()];
-    let times = |q: &[BigRational], sign: bool| {
+    let mut result: Vec<BigInt> = Vec::new();
+    let mut power = vec![BigInt::one()];
+    let times = |q: &[BigInt], sign: bool| {
         // q (w + 1) or q (-w + 1), highest power first.
-        let mut out = vec![BigRational::zero(); q.len() + 1];
+        let mut out = vec![BigInt::zero(); q.len() + 1];
         for (k, c) in q.iter().enumerate() {
             out[k + 1] += c;
             if sign { out[k] += c } else { out[k] -= c }
@@ -225,7 +239,7 @@ pub(crate) fn moebius(p: &[BigRational]) -> Vec<BigRational> {
         out
     };
     for c in p {
-        result = if result.is_empty() { vec![BigRational::zero()] } else { times(&result, true) };
+        result = if result.is_empty() { vec![BigInt::zero()] } else { times(&result, true) };
         for (sum, x) in result.iter_mut().zip(&power) {
             *sum += x * c;
         }
@@ -244,31 +258,35 @@ mod tests {
         values.iter().map(|&v| ratio(v, 1)).collect()
     }
 
+    fn whole(values: &[i64]) -> Vec<BigInt> {
+        values.iter().map(|&v| v.into()).collect()
+    }
+
     #[test]
     fn the_unit_circle_maps_to_the_axis() {
         // z - r goes to (1 + r) w + (1 - r).
-        assert_eq!(moebius(&poly(&[2, -1])), poly(&[3, 1]));
+        assert_eq!(moebius(&whole(&[2, -1])), whole(&[3, 1]));
         // z^2 + 1 has its roots on the circle: 2 w^2 + 2.
-        assert_eq!(moebius(&poly(&[1, 0, 1])), poly(&[2, 0, 2]));
+        assert_eq!(moebius(&whole(&[1, 0, 1])), whole(&[2, 0, 2]));
     }
 
     #[test]
     fn a_stable_pair_of_ends_does_not_make_a_stable_edge() {
         // s^3 + x s^2 + (3 - x) s + 1 is stable for x (3 - x) > 1: between 0.38 and 2.62, where both coefficients are positive.
-        let family = AffineFamily(vec![poly(&[1, 0, 3, 1]), poly(&[0, 1, -1, 0])]);
+        let family = AffineFamily::new(&[poly(&[1, 0, 3, 1]), poly(&[0, 1, -1, 0])]);
         assert_eq!(family.is_hurwitz_on(&[[ratio(1, 2), ratio(5, 2)]]), Ok(()));
         assert_eq!(family.is_hurwitz_on(&[[ratio(1, 2), ratio(27, 10)]]), Err(BoxFlaw::Edge(0)));
         assert_eq!(family.is_hurwitz_on(&[[ratio(1, 5), ratio(3, 10)]]), Err(BoxFlaw::FirstCorner));
         assert!(family.is_nowhere_hurwitz_on(&[[ratio(1, 5), ratio(3, 10)]]));
         assert!(!family.is_nowhere_hurwitz_on(&[[ratio(1, 5), ratio(1, 2)]]));
         // The box in between is unstable although both ends are stable: (s + 1)^3 against a far polynomial.
-        let far = AffineFamily(vec![poly(&[1, 10, 10, 1]), poly(&[0, -20, -20, 200])]);
+        let far = AffineFamily::new(&[poly(&[1, 10, 10, 1]), poly(&[0, -20, -20, 200])]);
         assert!(far.is_hurwitz_at(&[&ratio(0, 1)]));
         assert_ne!(far.is_hurwitz_on(&[[ratio(0, 1), ratio(1, 1)]]), Ok(()));
         // A real root through 0, and a degree that drops.
-        let through_zero = AffineFamily(vec![poly(&[1, 3, 1]), poly(&[0, 0, -2])]);
+        let through_zero = AffineFamily::new(&[poly(&[1, 3, 1]), poly(&[0, 0, -2])]);
         assert_eq!(through_zero.is_hurwitz_on(&[[ratio(0, 1), ratio(1, 1)]]), Err(BoxFlaw::Ends));
-        let drop = AffineFamily(vec![poly(&[1, 3, 1]), poly(&[-1, 0, 0])]);
+        let drop = AffineFamily::new(&[poly(&[1, 3, 1]), poly(&[-1, 0, 0])]);
         assert_eq!(drop.is_hurwitz_on(&[[ratio(0, 1), ratio(1, 1)]]), Err(BoxFlaw::Ends));
         assert_eq!(drop.is_hurwitz_on(&[[ratio(1, 1), ratio(0, 1)]]), Err(BoxFlaw::Empty));
     }
@@ -279,7 +297,7 @@ mod tests {
         #[test]
         fn edges_agree_with_a_scan(p in prop::collection::vec(1_i64..30, 6), q in prop::collection::vec(1_i64..30, 6)) {
             let difference: Vec<i64> = q.iter().zip(&p).map(|(q, p)| q - p).collect();
-            let family = AffineFamily(vec![poly(&p), poly(&difference)]);
+            let family = AffineFamily::new(&[poly(&p), poly(&difference)]);
             let stable = |k: i64| family.is_hurwitz_at(&[&ratio(k, 60)]);
             let whole = family.is_hurwitz_on(&[[ratio(0, 1), ratio(1, 1)]]).is_ok();
             let scan = (0..=60).all(stable);

@@ -20,6 +20,7 @@
 //! by which the delay exceeds k are enclosed by rationals ([`exact_hold_ranges`]). Each is Schur, with z scaled by `1 - rate h <= exp(-rate h)`, if its image under
 //! `z = (1 + w)/(1 - w)` is Hurwitz: [`polytope`](crate::polytope). Derivation: `proofs/claims/sampled.md`.
 
+use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::{One, ToPrimitive, Zero};
 use serde::{Deserialize, Serialize};
@@ -37,7 +38,7 @@ pub const MOST_DELAY_SAMPLES: usize = 16;
 /// How the arm moves between two samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Plant {
+pub enum PlantStep {
     /// One semi-implicit Euler step a sample, as the simulator takes it.
     SemiImplicit,
     /// The linearised differential equation itself under a held torque.
@@ -80,7 +81,7 @@ impl SampledFamily {
 
     /// The polynomials with k whole samples of delay, after `z -> (1 - rate h) z` and the map to w: parameters (m, d, g), or
     /// (m^, d, theta, lambda, omega, nu).
-    fn polynomials(&self, plant: Plant, k: usize, rate: &BigRational) -> AffineFamily {
+    fn polynomials(&self, plant: PlantStep, k: usize, rate: &BigRational) -> AffineFamily {
         let (h, square) = (&self.period, &self.period * &self.period);
         let one = BigRational::one;
         let (z, difference) = (vec![one(), BigRational::zero()], vec![one(), -one()]);
@@ -91,13 +92,13 @@ impl SampledFamily {
         let inertia = product(&[&open, &difference, &difference]);
         let by_dq = product(&[&z, &velocity, &difference]);
         let parts = match plant {
-            Plant::SemiImplicit => vec![
+            PlantStep::SemiImplicit => vec![
                 negated_sum(&product(&[&z, &position, &z]), &by_dq),
                 inertia,
                 scaled(&product(&[&open, &difference]), h),
                 scaled(&product(&[&open, &z]), &square),
             ],
-            Plant::ZeroOrderHold => {
+            PlantStep::ZeroOrderHold => {
                 let sum = vec![one(), one()];
                 vec![
                     negated_sum(&product(&[&z, &position]), &by_dq),
@@ -111,16 +112,26 @@ impl SampledFamily {
             }
         };
         let length = k + 7;
+        let padded: Vec<Vec<BigRational>> = parts
+            .into_iter()
+            .map(|part| {
+                let mut padded = vec![BigRational::zero(); length.saturating_sub(part.len())];
+                padded.extend(part);
+                padded
+            })
+            .collect();
+        // z -> (n/d) z, times d to the degree: coefficient of z^j times n^j d^(degree - j).
         let scale = one() - rate * h;
-        AffineFamily(parts).map(|part| {
-            let mut padded = vec![BigRational::zero(); length.saturating_sub(part.len())];
-            padded.extend_from_slice(part);
-            let mut power = one();
-            for c in padded.iter_mut().rev() {
-                *c *= &power;
-                power *= &scale;
+        AffineFamily::new(&padded).map(|part| {
+            let mut scaled = part.to_vec();
+            let (mut up, mut down) = (BigInt::one(), BigInt::one());
+            for (k, j) in (0..scaled.len()).zip((0..scaled.len()).rev()) {
+                scaled[j] *= &up;
+                scaled[k] *= &down;
+                up *= scale.numer();
+                down *= scale.denom();
             }
-            moebius(&padded)
+            moebius(&scaled)
         })
     }
 
@@ -131,7 +142,7 @@ impl SampledFamily {
     /// Where the proof stops, in words.
     pub fn decays_on(
         &self,
-        plant: Plant,
+        plant: PlantStep,
         range: &LoopBox,
         delay: &BigRational,
         rate: &BigRational,
@@ -143,7 +154,7 @@ impl SampledFamily {
         let rest = delay.fract();
         // The exact hold at delays from k to k + 1 for each k that there is, and the rest; the semi-implicit plant at each k.
         let pieces = (0..whole)
-            .map(|k| (k, if plant == Plant::ZeroOrderHold { BigRational::one() } else { BigRational::zero() }));
+            .map(|k| (k, if plant == PlantStep::ZeroOrderHold { BigRational::one() } else { BigRational::zero() }));
         pieces
             .chain([(whole, rest)])
             .try_for_each(|(k, fraction)| self.decays_between(plant, range, k, &fraction, rate))
@@ -155,7 +166,7 @@ impl SampledFamily {
     /// As there.
     pub fn decays_between(
         &self,
-        plant: Plant,
+        plant: PlantStep,
         range: &LoopBox,
         k: usize,
         fraction: &BigRational,
@@ -175,14 +186,14 @@ impl SampledFamily {
         }
         let polynomials = self.polynomials(plant, k, rate);
         let (ranges, axes) = match plant {
-            Plant::SemiImplicit => {
+            PlantStep::SemiImplicit => {
                 if !fraction.is_zero() {
                     return Err("the semi-implicit plant knows whole samples of delay only".to_owned());
                 }
                 let ranges = [&range.inertia, &range.friction, &range.stiffness].map(values).to_vec();
                 (ranges, ["inertia", "friction", "stiffness"].as_slice())
             }
-            Plant::ZeroOrderHold => {
+            PlantStep::ZeroOrderHold => {
                 if range.stiffness.iter().any(|end| !end.value().is_zero()) {
                     return Err("the exact hold is proved with gravity compensated only".to_owned());
                 }
@@ -200,14 +211,14 @@ impl SampledFamily {
     ///
     /// Exact for the semi-implicit plant up to the replacement of `exp(-rate h)` by `1 - rate h`, so give rate 0 for instability. For the exact hold
     /// an enclosure of the loop must have no root on the circle and a root outside.
-    pub fn fails_at(&self, plant: Plant, point: [&BigRational; 3], k: usize, rate: &BigRational) -> bool {
+    pub fn fails_at(&self, plant: PlantStep, point: [&BigRational; 3], k: usize, rate: &BigRational) -> bool {
         let [m, d, g] = point;
         if !positive(m) || k > MOST_DELAY_SAMPLES || !positive(&(BigRational::one() - rate * &self.period)) {
             return false;
         }
         match plant {
-            Plant::SemiImplicit => !self.polynomials(plant, k, rate).is_hurwitz_at(&point),
-            Plant::ZeroOrderHold => {
+            PlantStep::SemiImplicit => !self.polynomials(plant, k, rate).is_hurwitz_at(&point),
+            PlantStep::ZeroOrderHold => {
                 g.is_zero()
                     && self.polynomials(plant, k, rate).is_nowhere_hurwitz_on(&exact_hold_at(m, d, &self.period))
             }

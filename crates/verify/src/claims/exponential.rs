@@ -104,7 +104,7 @@ impl LoopBox {
 #[derive(Clone, Debug)]
 pub struct LoopFamily {
     /// p_0, p_m, p_d, p_g, coefficients from the highest power of s down.
-    parts: AffineFamily,
+    parts: Vec<Vec<BigRational>>,
 }
 
 impl LoopFamily {
@@ -120,13 +120,13 @@ impl LoopFamily {
         let unit = at(1, 0, 0);
         let by_inertia = minus(&at(2, 0, 0), &unit);
         let (by_friction, by_stiffness) = (minus(&at(1, 1, 0), &unit), minus(&at(1, 0, 1), &unit));
-        Ok(Self { parts: AffineFamily(vec![minus(&unit, &by_inertia), by_inertia, by_friction, by_stiffness]) })
+        Ok(Self { parts: vec![minus(&unit, &by_inertia), by_inertia, by_friction, by_stiffness] })
     }
 
     /// The four parts after the substitution `s -> s - rate`.
     fn shifted(&self, rate: &BigRational) -> AffineFamily {
-        self.parts.map(|part| {
-            let mut p = part.to_vec();
+        let shift = |part: &Vec<BigRational>| {
+            let mut p = part.clone();
             // Repeated synthetic division at -rate (Taylor shift).
             for last in (1..p.len()).rev() {
                 for k in 1..=last {
@@ -135,7 +135,8 @@ impl LoopFamily {
                 }
             }
             p
-        })
+        };
+        AffineFamily::new(&self.parts.iter().map(shift).collect::<Vec<_>>())
     }
 
     /// Whether the one-joint loop at (inertia, friction, stiffness) decays faster than `exp(-rate t)`. Exact.
@@ -221,9 +222,12 @@ mod tests {
             let shifted = family.shifted(&rate).at(&[&m, &d, &g]);
             let direct = polynomial(&shared, [m, d, g]);
             let value = |p: &[BigRational], s: &BigRational| p.iter().fold(ratio(0, 1), |sum, c| sum * s + c);
+            let shifted: Vec<_> = shifted.into_iter().map(BigRational::from_integer).collect();
+            let factor = &shifted[0] / &direct[0];
+            prop_assert!(positive(&factor));
             for s in 0..8 {
                 let s = ratio(s, 3);
-                prop_assert_eq!(value(&shifted, &s), value(&direct, &(&s - &rate)));
+                prop_assert_eq!(value(&shifted, &s), &factor * value(&direct, &(&s - &rate)));
             }
         }
     }

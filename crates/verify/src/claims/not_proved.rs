@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::refused::check_remedies;
-use super::sampled::{Sampling, milliseconds};
+use super::sampled::{LoopTiming, milliseconds};
 use super::variation::{Variation, would_be_stable};
 use super::{ClaimKind, Inequality, Provable};
 use crate::document::Document;
@@ -18,7 +18,7 @@ pub struct NotProvedClaim {
     /// Which claim was attempted.
     pub of: ClaimKind,
     /// How the loop was to be sampled, when the claim was `sampled`.
-    pub sampling: Option<Sampling>,
+    pub sampling: Option<LoopTiming>,
     /// How far the inequalities are from feasible in the solver's units; positive is infeasible.
     pub distance: Option<Number>,
     /// Why no proof was attempted or found.
@@ -37,6 +37,8 @@ pub enum Reason {
     OtherController,
     /// The proof needs a constant that is not known for this family.
     ConstantMissing,
+    /// The released code's adaptation is not the one of the equations.
+    ReleasedCode,
     /// The proof does not cover families of this kind.
     FamilyNotCovered,
     /// Stable, but too slowly for the rates that are tried.
@@ -60,6 +62,10 @@ impl Reason {
             Self::UnequalGains => "this claim needs the same gains on every joint",
             Self::OtherController => "this claim is about the other controller",
             Self::ConstantMissing => "the proof needs a constant that is not known for this family",
+            Self::ReleasedCode => {
+                "in the released code the integrals of the adaptation lack the step and K1 reads the sum of K0: the adaptive blocks are not lossless, \
+                 and the proof does not apply"
+            }
             Self::FamilyNotCovered => "the proof does not cover families of this kind",
             Self::TooSlow => "the loops of the box are stable, but at no rate of at least 0.001 per s",
             Self::NoPointFound => "the box is not shown stable, and no unstable point of it was found",

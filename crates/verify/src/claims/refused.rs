@@ -6,7 +6,7 @@ use num_rational::BigRational;
 use num_traits::{Signed, Zero};
 use serde::{Deserialize, Serialize};
 
-use super::sampled::{Sampling, milliseconds};
+use super::sampled::{LoopTiming, milliseconds};
 use super::variation::{Variation, varied, would_be_stable};
 use super::{ClaimKind, Inequality, LoopBox, LoopFamily, Provable, family_box};
 use crate::document::Document;
@@ -52,7 +52,7 @@ pub struct RefusedClaim {
     /// Which claim is refused: `exponential` or `sampled`.
     pub of: ClaimKind,
     /// How the refused loop is sampled, with the very delay at which it fails, a whole number of samples; none in continuous time.
-    pub sampling: Option<Sampling>,
+    pub sampling: Option<LoopTiming>,
     /// The rate that was asked for, 1/s; 0 asks for stability alone.
     pub rate_per_s: Number,
     /// The loop at this point does not decay at that rate; exact.
@@ -132,13 +132,13 @@ impl Provable for RefusedClaim {
 /// The linearised loops that a claim is about.
 enum LinearisedLoop<'a> {
     Continuous(LoopFamily),
-    Sampled(SampledFamily, &'a Sampling),
+    Sampled(SampledFamily, &'a LoopTiming),
 }
 
 fn linearised_loop<'a>(
     document: &Document,
     of: ClaimKind,
-    sampling: Option<&'a Sampling>,
+    sampling: Option<&'a LoopTiming>,
 ) -> Result<LinearisedLoop<'a>, Flaw> {
     match (of, sampling) {
         (ClaimKind::Exponential, None) => Ok(LinearisedLoop::Continuous(LoopFamily::new(document.gains.aic()?)?)),
@@ -180,7 +180,7 @@ impl LinearisedLoop<'_> {
 pub(crate) fn check_remedies(
     document: &Document,
     of: ClaimKind,
-    sampling: Option<&Sampling>,
+    sampling: Option<&LoopTiming>,
     remedies: &[Variation],
 ) -> Result<(), Flaw> {
     if remedies.is_empty() {

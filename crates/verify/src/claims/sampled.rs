@@ -12,21 +12,21 @@ use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::{Number, ratio};
 use crate::quantity::{require, require_at_least_zero, require_positive};
-use crate::sampled_loops::{Plant, SampledFamily};
+use crate::sampled_loops::{PlantStep, SampledFamily};
 
 /// How often the controller runs, and how late its torque acts on which plant.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Sampling {
+pub struct LoopTiming {
     /// How the arm moves between two samples.
-    pub plant: Plant,
+    pub plant: PlantStep,
     /// Time between two samples, s.
     pub period_s: Number,
     /// Time from a sample to the moment its torque acts: constant, and anything up to this, s.
     pub delay_s: Number,
 }
 
-impl Sampling {
+impl LoopTiming {
     /// The delay in samples.
     pub fn delay_samples(&self) -> BigRational {
         if self.period_s.value().is_zero() { BigRational::zero() } else { self.delay_s.value() / self.period_s.value() }
@@ -40,8 +40,8 @@ impl Sampling {
     /// `sampled every 1 ms, ...`.
     pub(crate) fn in_words(&self) -> String {
         let plant = match self.plant {
-            Plant::SemiImplicit => "the arm advanced by the simulator's semi-implicit step",
-            Plant::ZeroOrderHold => "the arm moving in continuous time, its friction the same on every joint",
+            PlantStep::SemiImplicit => "the arm advanced by the simulator's semi-implicit step",
+            PlantStep::ZeroOrderHold => "the arm moving in continuous time, its friction the same on every joint",
         };
         format!("sampled every {} ms with a held torque, {plant}", milliseconds(&self.period_s))
     }
@@ -62,7 +62,7 @@ pub(crate) fn milliseconds(seconds: &Number) -> Number {
 #[serde(deny_unknown_fields)]
 pub struct SampledClaim {
     /// How it is sampled, and up to which delay it decays at the rate.
-    pub sampling: Sampling,
+    pub sampling: LoopTiming,
     /// Certified decay rate at every such delay, 1/s.
     pub rate_per_s: Number,
     /// Up to this delay, s, it is still stable.
@@ -78,8 +78,8 @@ impl Provable for SampledClaim {
 
     fn sentence(&self, _: &Document) -> String {
         let delays = match self.sampling.plant {
-            Plant::SemiImplicit => "a delay of any whole number of samples",
-            Plant::ZeroOrderHold => "any constant delay",
+            PlantStep::SemiImplicit => "a delay of any whole number of samples",
+            PlantStep::ZeroOrderHold => "any constant delay",
         };
         format!(
             "linearised at rest at any configuration and {}, the loop is exponentially stable with {delays} up to {} ms, every mode decaying faster than \
@@ -117,7 +117,7 @@ impl Provable for SampledClaim {
             loops.decays_on(self.sampling.plant, range, delay, rate).map_err(|reason| Flaw::Polynomial { reason })
         };
         let (delay, at_rest) = (self.sampling.delay_samples(), BigRational::zero());
-        let margin = Sampling { delay_s: self.delay_margin_s.clone(), ..self.sampling.clone() }.delay_samples();
+        let margin = LoopTiming { delay_s: self.delay_margin_s.clone(), ..self.sampling.clone() }.delay_samples();
         decays(&family_box(document), &delay, self.rate_per_s.value())?;
         decays(&family_box(document), &margin, &at_rest)?;
         varied(document, &self.margins, &|range| decays(range, &delay, &at_rest))?;
