@@ -30,7 +30,15 @@ impl<const N: usize> ArmCertifier<N> {
         let closed = linearise_aic(&model, &member.q, &params, self.family().gravity_compensation)?;
         let decay = -closed.spectral_abscissa_per_s();
         let family = LinearFamily { vertices: vec![closed.matrix().clone()], configuration_rad: Some(q_rad.to_vec()) };
-        let not_proved = |reason| Claim::NotProved(NotProvedClaim { of: ClaimKind::Lyapunov, distance: None, reason });
+        let not_proved = |reason| {
+            Claim::NotProved(NotProvedClaim {
+                of: ClaimKind::Lyapunov,
+                sampling: None,
+                distance: None,
+                reason,
+                remedies: Vec::new(),
+            })
+        };
         let mut claim = not_proved(if decay > 0.0 { Reason::CandidateFailed } else { Reason::NoPointFound });
         for share in SHARES {
             let rate = (decay * share * 1e3).floor() / 1e3;

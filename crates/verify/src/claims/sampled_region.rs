@@ -25,8 +25,8 @@ use super::{ClaimKind, Figure, Inequality, Provable, all_hold};
 use crate::algebra::zeros;
 use crate::document::{ConfigurationSet, Document};
 use crate::error::Flaw;
-use crate::normed::{Norm, Normed};
 use crate::form::Form;
+use crate::normed::{Norm, Normed};
 use crate::number::{Number, positive, unit_interval};
 use crate::quantity::{require, require_length, require_positive};
 
