@@ -46,6 +46,7 @@ mod eigen;
 mod error;
 mod maximise;
 mod quantity;
+pub mod rigorous;
 mod sampled;
 mod sequence;
 
