@@ -21,7 +21,7 @@ use certune_linsys::JointMatrix;
 
 use crate::eigen::symmetric_eigen;
 use crate::rigorous::angle::{Points, Span};
-use crate::rigorous::chain::{Chain, Step, Vec3, carry, compose, identity, turned};
+use crate::rigorous::chain::{Chain, Step, Vec3, compose, identity, turned};
 use crate::rigorous::definite::{Factor, cholesky_allowance};
 use crate::rigorous::scalar::{Majorant, Scalar, UNIT, frobenius};
 use crate::rigorous::sweep::Sweep;
@@ -49,7 +49,7 @@ fn outer<const N: usize, T: Scalar>(first: usize, steps: &[Step<T>; N], moments:
     for b in first..N {
         if b > first {
             for a in first..b {
-                moved[a] = carry(&moved[a], &steps[b]);
+                moved[a] = compose(&moved[a], &steps[b]);
             }
             frame = compose(&frame, &steps[b]);
         }
@@ -329,12 +329,22 @@ fn allowances<const N: usize>(chain: &Chain<N, f64>, first: usize, corners: &[Po
     (frobenius(&errors), std::array::from_fn(|j| dot(&gamma, &outer.torque[j]).bound()))
 }
 
-/// `dg/dq` at one corner of every joint, in plain floating point, for choosing a plan.
+/// `dg/dq` at one corner of every joint.
 pub(crate) fn stiffness_at<const N: usize>(chain: &Chain<N, f64>, corners: &[[f64; 2]; N]) -> [[f64; N]; N] {
-    let mut stiffness = [[0.0; N]; N];
-    if let Some((outer, gamma)) = at_corners(chain, corners) {
-        for b in first_joint(chain)..N {
-            for a in first_joint(chain)..=b {
+    stiffness_from(chain, first_joint(chain), corners)
+}
+
+/// The same, when the first joint is known.
+pub(crate) fn stiffness_from<const N: usize, T: Scalar>(
+    chain: &Chain<N, T>,
+    first: usize,
+    corners: &[[T; 2]; N],
+) -> [[T; N]; N] {
+    let mut stiffness = [[T::zero(); N]; N];
+    if first < N {
+        let (outer, gamma) = at_corners(chain, first, corners);
+        for b in first..N {
+            for a in first..=b {
                 stiffness[b][a] = dot(&gamma, &outer.stiffness[b][a]);
                 stiffness[a][b] = stiffness[b][a];
             }
@@ -343,27 +353,31 @@ pub(crate) fn stiffness_at<const N: usize>(chain: &Chain<N, f64>, corners: &[[f6
     stiffness
 }
 
-/// All joints set; none if gravity moves no joint.
-fn at_corners<const N: usize>(chain: &Chain<N, f64>, corners: &[[f64; 2]; N]) -> Option<(Outer<N, f64>, Vec3<f64>)> {
-    let first = first_joint(chain);
-    let corner = corners.get(first)?;
-    let own = own_moments(chain);
-    let mut moments = own;
-    let mut steps = [[[0.0; 4]; 3]; N];
-    for j in (first + 1..N).rev() {
-        steps[j] = chain.step(j, corners[j]);
-        moments[j - 1] = shifted(&own[j - 1], &steps[j], &moments[j]);
-    }
-    Some((outer(first, &steps, &moments), turned_row(&before_turn(chain, first), *corner)))
-}
-
-/// Gravity torques at one corner of every joint, in plain floating point, for choosing a plan.
+/// Gravity torques at one corner of every joint.
 pub(crate) fn torque_at<const N: usize>(chain: &Chain<N, f64>, corners: &[[f64; 2]; N]) -> [f64; N] {
     let mut torque = [0.0; N];
-    if let Some((outer, gamma)) = at_corners(chain, corners) {
-        for j in first_joint(chain)..N {
+    let first = first_joint(chain);
+    if first < N {
+        let (outer, gamma) = at_corners(chain, first, corners);
+        for j in first..N {
             torque[j] = dot(&gamma, &outer.torque[j]);
         }
     }
     torque
+}
+
+/// All joints set; `first < N`.
+fn at_corners<const N: usize, T: Scalar>(
+    chain: &Chain<N, T>,
+    first: usize,
+    corners: &[[T; 2]; N],
+) -> (Outer<N, T>, Vec3<T>) {
+    let own = own_moments(chain);
+    let mut moments = own;
+    let mut steps = [[[T::zero(); 4]; 3]; N];
+    for j in (first + 1..N).rev() {
+        steps[j] = chain.step(j, corners[j]);
+        moments[j - 1] = shifted(&own[j - 1], &steps[j], &moments[j]);
+    }
+    (outer(first, &steps, &moments), turned_row(&before_turn(chain, first), corners[first]))
 }

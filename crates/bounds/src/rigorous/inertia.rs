@@ -25,7 +25,7 @@ use certune_linsys::JointMatrix;
 use crate::eigen::symmetric_eigen;
 use crate::error::BoundsError;
 use crate::rigorous::angle::Points;
-use crate::rigorous::chain::{Chain, Step, Sym4, carry, compose, composite, identity, turned};
+use crate::rigorous::chain::{Chain, Step, Sym4, compose, composite, identity, turned};
 use crate::rigorous::definite::{Factor, cholesky_allowance};
 use crate::rigorous::scalar::{Majorant, Scalar, UNIT, frobenius};
 use crate::rigorous::sweep::Sweep;
@@ -62,7 +62,7 @@ fn outer<const N: usize, T: Scalar>(steps: &[Step<T>; N], composites: &[Sym4<T>;
     for b in 1..N {
         if b > 1 {
             for a in 1..b {
-                moved[a] = carry(&moved[a], &steps[b]);
+                moved[a] = compose(&moved[a], &steps[b]);
             }
             frame = compose(&frame, &steps[b]);
         }
@@ -330,24 +330,24 @@ fn allowance<const N: usize>(chain: &Chain<N, f64>, rotor: &[f64; N], corners: &
     frobenius(&errors)
 }
 
-/// M at one corner of every joint, without rotor inertia; in plain floating point, for choosing a plan.
-pub(crate) fn inertia_at<const N: usize>(chain: &Chain<N, f64>, corners: &[[f64; 2]; N]) -> [[f64; N]; N] {
-    let mut m = [[0.0; N]; N];
-    let own: [Sym4<f64>; N] = std::array::from_fn(|j| chain.second_moments(j));
+/// M at one corner of every joint, without rotor inertia.
+pub(crate) fn inertia_at<const N: usize, T: Scalar>(chain: &Chain<N, T>, corners: &[[T; 2]; N]) -> [[T; N]; N] {
+    let mut m = [[T::zero(); N]; N];
+    let own: [Sym4<T>; N] = std::array::from_fn(|j| chain.second_moments(j));
     if N < 2 {
         m[0][0] = own[0][0][0] + own[0][1][1];
         return m;
     }
-    let mut steps = [[[0.0; 4]; 3]; N];
+    let mut steps = [[[T::zero(); 4]; 3]; N];
     let mut composites = own;
-    for j in (1..N).rev() {
+    for j in (2..N).rev() {
         steps[j] = chain.step(j, corners[j]);
         composites[j - 1] = composite(&own[j - 1], &steps[j], &composites[j]);
     }
     let outer = outer(&steps, &composites);
     let inner = inner(chain, corners[1]);
     let square = corners[1][0] * corners[1][0] + corners[1][1] * corners[1][1];
-    m[0][0] = composites[0][0][0] + composites[0][1][1];
+    m[0][0] = corner_inertia(&own[0], &UPPER.map(|(i, k)| composites[1][i][k]), &inner.zeta);
     for b in 1..N {
         m[0][b] = off_diagonal(&outer.wrench[b], &inner.xi);
         m[b][0] = m[0][b];
