@@ -46,7 +46,7 @@ impl Effort {
     /// Corners of all joints but the innermost, times the same for the angles of k_c.
     fn budgets(self) -> Budgets {
         match self {
-            Self::Quick => Budgets { inertia: 2e4, gravity: 4e4, part: 2e3, torque: 4e4, grid: 2e4, part_grid: 2e4 },
+            Self::Quick => Budgets { inertia: 4e4, gravity: 4e4, part: 2e3, torque: 4e4, grid: 6e4, part_grid: 1e5 },
             Self::Standard => Budgets { inertia: 3e6, gravity: 6e6, part: 2e5, torque: 6e6, grid: 3e6, part_grid: 5e5 },
             Self::Thorough => Budgets { inertia: 1e7, gravity: 2e7, part: 2e6, torque: 2e7, grid: 1e7, part_grid: 4e6 },
         }
