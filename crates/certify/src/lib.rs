@@ -9,22 +9,40 @@
 //! | `problem` | gains, family and constants of an arm as a document without claims |
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
+//! | `disturbance` | least bound on the error under noise and pushes |
+//! | `digits` | figures rounded to the safe side |
+//! | `joint_region` | the same, an ellipsoid, with gains, frictions and limits of each joint |
+//! | `moving_goal` | the fastest goal that a region allows |
+//! | `sampled_region` | the same of the sampled nonlinear loop |
+//! | `adaptive` | convergence, the frozen loop and the sampled velocity loop of the adaptive controller |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
 #![forbid(unsafe_code)]
 
+mod adaptive;
+mod digits;
+mod disturbance;
 mod exponential;
+mod joint_region;
 mod lmi;
+mod moving_goal;
 mod problem;
 mod region;
+mod sampled_region;
 
+pub use adaptive::{adaptive_convergence, adaptive_sampled, pi_exponential};
+pub use disturbance::{DisturbanceOptions, disturbance};
 pub use exponential::{UnstableLoop, exponential};
+pub use joint_region::{JointRegionOptions, joint_region};
 pub use lmi::{Affine, Program, Solution, SolveError};
+pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal, moving_goal_on};
 pub use problem::{
-    AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, ProblemError, SampledConstantValues, arm_ranges,
+    AicGainValues, ArmValues, ConstantValues, EnclosureValues, FamilyValues, MracGainValues, Problem, ProblemError,
+    SampledConstantValues, arm_ranges,
 };
 pub use region::{RegionOptions, region};
+pub use sampled_region::{SampledRegionOptions, sampled_region};
 
 use certune_verify::{
     Attained, Certificate, Claim, ClaimKind, Document, NotProvedClaim, Number, Reason, Rejection, seal, verify,
@@ -45,10 +63,18 @@ pub enum CertifyError {
 }
 
 /// How each kind of claim is searched.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// The region of the nonlinear loop.
     pub region: RegionOptions,
+    /// The region with gains, frictions and limits of each joint.
+    pub joint_region: JointRegionOptions,
+    /// The goal that moves.
+    pub moving_goal: MovingGoalOptions,
+    /// The region of the sampled nonlinear loop.
+    pub sampled_region: SampledRegionOptions,
+    /// The error under noise and pushes.
+    pub disturbance: DisturbanceOptions,
 }
 
 /// Makes the claims about a problem, in the order asked for, and has them checked.
@@ -66,12 +92,16 @@ pub fn certify(
 ) -> Result<Certificate, CertifyError> {
     let mut document = problem.document().clone();
     for kind in claims {
-        let claim = match kind {
-            ClaimKind::Exponential => exponential(problem, attain),
-            ClaimKind::Region => region(problem, &options.region),
-            other => not_proved(*other, Reason::FamilyNotCovered, None),
+        let made = match kind {
+            ClaimKind::Exponential => vec![exponential(problem, attain)],
+            ClaimKind::Region => vec![region(problem, &options.region)],
+            ClaimKind::JointRegion => vec![joint_region(problem, &options.joint_region)],
+            ClaimKind::MovingGoal => moving_goal(problem, &document, &options.moving_goal),
+            ClaimKind::SampledRegion => vec![sampled_region(problem, &options.sampled_region)],
+            ClaimKind::Disturbance => vec![disturbance(problem, &options.disturbance)],
+            other => vec![not_proved(*other, Reason::FamilyNotCovered, None)],
         };
-        document.claims.push(claim.into());
+        document.claims.extend(made.into_iter().map(Into::into));
     }
     let document = seal(document);
     Ok(verify(&to_json(&document)?, problem.records())??)

@@ -239,7 +239,9 @@ pub struct Bands {
 pub struct SearchRecord {
     /// Every candidate, in order.
     pub evaluations: Vec<Evaluation>,
-    /// Cost of the published gains on the plants of the search.
+    /// Unit of the costs, empty when they have none; a search may be after another cost than the one that judges the held-out plants.
+    pub unit: String,
+    /// Cost of the published gains in the search.
     pub published_cost: Option<f64>,
 }
 

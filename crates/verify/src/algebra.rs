@@ -18,14 +18,6 @@ pub(crate) fn zeros(order: usize) -> Matrix {
     vec![vec![BigRational::zero(); order]; order]
 }
 
-/// Adds `x` at `(i, j)` and, off the diagonal, at `(j, i)`: a term `2 x v_i v_j` of a quadratic form.
-pub(crate) fn add_symmetric(matrix: &mut Matrix, i: usize, j: usize, x: &BigRational) {
-    matrix[i][j] += x;
-    if i != j {
-        matrix[j][i] += x;
-    }
-}
-
 /// The pivots of `L D L'`, or `None` at the first that is not positive: then the matrix is not positive definite.
 ///
 /// The matrix must be symmetric; an asymmetric one is answered with `None`.

@@ -1,9 +1,18 @@
 //! The kinds of claims. Each file holds what one kind states, its words, and its proof.
 
+mod adaptive_convergence;
+mod adaptive_sampled;
+mod disturbance;
+mod energy;
 mod exponential;
+mod joint_region;
+mod moving_goal;
 mod not_proved;
+mod pi_exponential;
 mod refused;
 mod region;
+mod sampled_motion;
+mod sampled_region;
 
 use num_rational::BigRational;
 use serde::{Deserialize, Serialize};
@@ -13,10 +22,25 @@ use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
 
+pub use adaptive_convergence::{
+    AdaptiveConvergenceClaim, AdaptiveLoop, AdaptiveRefusedClaim, AdaptiveWitness, adaptive_inequalities,
+};
+pub use adaptive_sampled::{AdaptiveSampledClaim, AdaptiveSampledRefusedClaim};
+pub use disturbance::{DisturbanceClaim, DisturbanceWitness, DisturbedArm, disturbance_inequalities};
+pub use energy::{Energy, Plant, Point, State, TRIANGLE, triangle};
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
+pub use joint_region::{
+    CoveredSteps, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights, joint_region_inequalities,
+};
+pub use moving_goal::{GoalList, ListedGoal, MovingGoalClaim, moving_goal_inequalities};
 pub use not_proved::{NotProvedClaim, Reason};
+pub use pi_exponential::{PiExponentialClaim, PiRefusedClaim, pi_inequalities};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
-pub use region::{RegionClaim, RegionWitness, region_inequalities};
+pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
+pub use sampled_motion::{Coordinates, Corner, Reach, SampledLoop, SampledUnknowns};
+pub use sampled_region::{
+    Compensation, SampledRegionClaim, SampledRegionWitness, Sampling, sampled_loop, sampled_region_inequalities,
+};
 
 /// What an entry of a document claims.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -26,6 +50,26 @@ pub enum Claim {
     Exponential(ExponentialClaim),
     /// The nonlinear loop decays from every start in a ball.
     Region(Box<RegionClaim>),
+    /// The adaptive loop's error converges.
+    AdaptiveConvergence(Box<AdaptiveConvergenceClaim>),
+    /// No function of the form that `adaptive-convergence` needs falls.
+    AdaptiveRefused(Box<AdaptiveRefusedClaim>),
+    /// The adaptive loop decays when its adaptation is frozen.
+    PiExponential(PiExponentialClaim),
+    /// It does not, for one joint and inertia.
+    PiRefused(PiRefusedClaim),
+    /// The adaptive loop's velocity loop survives sampling and delay.
+    AdaptiveSampled(AdaptiveSampledClaim),
+    /// It does not, because of one joint.
+    AdaptiveSampledRefused(AdaptiveSampledRefusedClaim),
+    /// The same with gains, frictions and limits of each joint.
+    JointRegion(Box<JointRegionClaim>),
+    /// The state stays in the region of an earlier entry while the goal moves.
+    MovingGoal(Box<MovingGoalClaim>),
+    /// The sampled nonlinear loop decays from every start in a ball.
+    SampledRegion(Box<SampledRegionClaim>),
+    /// The error stays bounded under bounded noise and pushes.
+    Disturbance(Box<DisturbanceClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -37,6 +81,16 @@ impl Claim {
         match self {
             Self::Exponential(claim) => claim,
             Self::Region(claim) => claim.as_ref(),
+            Self::AdaptiveConvergence(claim) => claim.as_ref(),
+            Self::AdaptiveRefused(claim) => claim.as_ref(),
+            Self::PiExponential(claim) => claim,
+            Self::PiRefused(claim) => claim,
+            Self::AdaptiveSampled(claim) => claim,
+            Self::AdaptiveSampledRefused(claim) => claim,
+            Self::JointRegion(claim) => claim.as_ref(),
+            Self::MovingGoal(claim) => claim.as_ref(),
+            Self::SampledRegion(claim) => claim.as_ref(),
+            Self::Disturbance(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -50,9 +104,11 @@ impl Claim {
     /// What a checked entry of this kind amounts to.
     pub fn verdict(&self) -> Verdict {
         match self {
-            Self::Refused(_) => Verdict::Refused,
+            Self::Refused(_) | Self::AdaptiveRefused(_) | Self::PiRefused(_) | Self::AdaptiveSampledRefused(_) => {
+                Verdict::Refused
+            }
             Self::NotProved(_) => Verdict::NotProved,
-            Self::Exponential(_) | Self::Region(_) => Verdict::Holds,
+            _ => Verdict::Holds,
         }
     }
 
@@ -86,9 +142,26 @@ pub enum ClaimKind {
     AdaptiveConvergence,
     /// The adaptive loop decays when its adaptation is frozen.
     PiExponential,
+    /// The adaptive loop's velocity loop survives sampling and delay.
+    AdaptiveSampled,
 }
 
 impl ClaimKind {
+    /// Every kind.
+    pub const ALL: [Self; 11] = [
+        Self::Exponential,
+        Self::Sampled,
+        Self::Region,
+        Self::JointRegion,
+        Self::SampledRegion,
+        Self::MovingGoal,
+        Self::Disturbance,
+        Self::Lyapunov,
+        Self::AdaptiveConvergence,
+        Self::PiExponential,
+        Self::AdaptiveSampled,
+    ];
+
     /// The name as it is written in files and flags.
     pub fn name(self) -> &'static str {
         match self {
@@ -102,6 +175,7 @@ impl ClaimKind {
             Self::Lyapunov => "lyapunov",
             Self::AdaptiveConvergence => "adaptive-convergence",
             Self::PiExponential => "pi-exponential",
+            Self::AdaptiveSampled => "adaptive-sampled",
         }
     }
 }

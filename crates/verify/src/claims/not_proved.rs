@@ -30,6 +30,8 @@ pub enum Reason {
     OtherController,
     /// The proof needs a constant that is not known for this family.
     ConstantMissing,
+    /// The released code's adaptation is not the one of the equations.
+    ReleasedCode,
     /// The proof does not cover families of this kind.
     FamilyNotCovered,
     /// Stable, but too slowly for the rates that are tried.
@@ -53,6 +55,10 @@ impl Reason {
             Self::UnequalGains => "this claim needs the same gains on every joint",
             Self::OtherController => "this claim is about the other controller",
             Self::ConstantMissing => "the proof needs a constant that is not known for this family",
+            Self::ReleasedCode => {
+                "in the released code the integrals of the adaptation lack the step and K1 reads the sum of K0: the adaptive blocks are not lossless, \
+                 and the proof does not apply"
+            }
             Self::FamilyNotCovered => "the proof does not cover families of this kind",
             Self::TooSlow => "the loops of the box are stable, but at no rate of at least 0.001 per s",
             Self::NoPointFound => "the box is not shown stable, and no unstable point of it was found",
