@@ -150,6 +150,11 @@ impl<const N: usize> ArmBox<N> {
         &self.groups
     }
 
+    /// The nominal arm, without payload of the box, rotor inertia and friction.
+    pub(crate) fn base(&self) -> &Model<N> {
+        &self.base
+    }
+
     /// Lower and upper rotor inertia of every joint, kg m².
     #[must_use]
     pub fn rotor_inertia_kg_m2(&self) -> [Joints<N>; 2] {

@@ -46,6 +46,7 @@ mod eigen;
 mod error;
 mod maximise;
 mod quantity;
+mod riccati;
 mod sampled;
 mod sequence;
 

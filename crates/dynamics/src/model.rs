@@ -41,6 +41,21 @@ pub struct Model<const N: usize, T: Real = f64> {
     pub(crate) flange_position: Vector3<T>,
 }
 
+/// The numbers of one link as the recursions use them, for whoever needs them exactly as they are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkNumbers {
+    /// Row-major rotation R0: columns are the joint frame's axes in the parent link at q = 0; the joint turns about its z.
+    pub rotation: [[f64; 3]; 3],
+    /// Origin of the joint frame in the parent link, m.
+    pub position_m: [f64; 3],
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Mass times centre of mass, in the link's frame, kg m.
+    pub first_moment_kg_m: [f64; 3],
+    /// Inertia about the link's origin: xx, yy, zz, xy, xz, yz, kg m^2.
+    pub about_origin_kg_m2: [f64; 6],
+}
+
 /// Joint positions in rad and velocities in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<const N: usize, T: Real = f64> {
@@ -132,6 +147,20 @@ impl<const N: usize> Model<N> {
     /// Mass of each link, payload included, kg.
     pub fn link_masses_kg(&self) -> [f64; N] {
         core::array::from_fn(|i| self.links[i].body.mass)
+    }
+
+    /// The numbers of every link, base to tip.
+    pub fn link_numbers(&self) -> [LinkNumbers; N] {
+        self.links.map(|link| {
+            let (r, about) = (link.rotation, link.body.about_origin);
+            LinkNumbers {
+                rotation: core::array::from_fn(|row| core::array::from_fn(|column| r[(row, column)])),
+                position_m: link.position.into(),
+                mass_kg: link.body.mass,
+                first_moment_kg_m: link.body.first_moment.into(),
+                about_origin_kg_m2: [about.xx, about.yy, about.zz, about.xy, about.xz, about.yz],
+            }
+        })
     }
 
     /// The same arm in every lane of another scalar.
