@@ -185,6 +185,30 @@ impl<const N: usize> ArmBox<N> {
         }
     }
 
+    /// The arm with every mass at its upper end, without rotor inertia.
+    pub(crate) fn upper_model(&self) -> Model<N> {
+        let scales: Vec<f64> = self.groups.iter().map(|group| group.scale[1]).collect();
+        self.model_unchecked(&scales)
+    }
+
+    /// The arm with every link's mass in the middle, without rotor inertia: with the least and with the largest payload.
+    pub(crate) fn nominal_models(&self) -> Vec<Model<N>> {
+        let mut scales: Vec<f64> = self.groups.iter().map(|group| 0.5 * (group.scale[0] + group.scale[1])).collect();
+        let payload = self.groups.get(N).map_or([0.0; 2], |group| group.scale);
+        scales.truncate(N);
+        let loads = if payload[0] < payload[1] { &payload[..] } else { &payload[..1] };
+        loads.iter().map(|load| self.model_unchecked(&[&scales[..], &[*load]].concat())).collect()
+    }
+
+    /// Each link with half the width of its scale's interval.
+    pub(crate) fn uncertain_links(&self) -> impl Iterator<Item = (&MassGroup<N>, f64)> {
+        self.groups.iter().take(N).map(|group| {
+            let [lower, upper] = group.scale;
+            let half = if lower < upper { (0.5 * (upper - lower)) * (1.0 + 8.0 * f64::EPSILON) } else { 0.0 };
+            (group, half)
+        })
+    }
+
     /// The axes of a search over members: N joint angles (full circles), then one scale per group, then one common
     /// fraction in `[0, 1]` between the lower and the upper rotor inertia.
     ///

@@ -47,6 +47,7 @@ mod error;
 mod maximise;
 mod quantity;
 mod riccati;
+pub mod rigorous;
 mod sampled;
 mod sequence;
 

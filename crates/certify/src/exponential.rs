@@ -1,8 +1,8 @@
 //! The largest certified decay rate of the linearised loops, or a point of the box that contradicts stability.
 
 use certune_verify::{
-    Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, Grade, LoopBox, LoopFamily, NotProvedClaim, Number, Reason,
-    RefusedClaim, family_box,
+    Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, LoopBox, LoopFamily, Number, Reason, RefusedClaim,
+    family_box,
 };
 use num_rational::BigRational;
 use num_traits::Zero;
@@ -38,7 +38,10 @@ fn rate(steps: u32) -> Option<Number> {
 pub fn exponential(problem: &Problem, attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>) -> Claim {
     let document = problem.document();
     let range = family_box(document);
-    let Ok(loops) = LoopFamily::new(&document.gains) else {
+    let Ok(gains) = document.gains.aic() else {
+        return not_proved(Reason::OtherController);
+    };
+    let Ok(loops) = LoopFamily::new(gains) else {
         return not_proved(Reason::UnequalGains);
     };
     let decays = |steps: u32| rate(steps).is_some_and(|r| loops.decays_on(&range, r.value()).is_ok());
@@ -56,15 +59,13 @@ pub fn exponential(problem: &Problem, attain: &dyn Fn() -> Option<(UnstableLoop,
         }
     }
     match rate(certified) {
-        Some(rate_per_s) => {
-            Claim::Exponential(ExponentialClaim { statement: String::new(), grade: Grade::Conditional, rate_per_s })
-        }
+        Some(rate_per_s) => Claim::Exponential(ExponentialClaim { rate_per_s }),
         None => not_proved(Reason::OutOfRange),
     }
 }
 
 fn not_proved(reason: Reason) -> Claim {
-    Claim::NotProved(NotProvedClaim { statement: String::new(), of: ClaimKind::Exponential, distance: None, reason })
+    crate::not_proved(ClaimKind::Exponential, reason, None)
 }
 
 fn refuse(loops: &LoopFamily, range: &LoopBox, attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>) -> Claim {
@@ -75,7 +76,12 @@ fn refuse(loops: &LoopFamily, range: &LoopBox, attain: &dyn Fn() -> Option<(Unst
     let unstable =
         |point: &BoxPoint| range.contains(coordinates(point)) && !loops.is_stable_at(coordinates(point), &zero);
     let refused = |point: BoxPoint, attained: Option<Attained>| {
-        Claim::Refused(Box::new(RefusedClaim { statement: String::new(), rate_per_s: Number::zero(), point, attained }))
+        Claim::Refused(Box::new(RefusedClaim {
+            of: ClaimKind::Exponential,
+            rate_per_s: Number::zero(),
+            point,
+            attained,
+        }))
     };
     if let Some((found, attained)) = attain() {
         let values = [found.inertia_kg_m2, found.friction_n_m_s_per_rad, found.stiffness_n_m_per_rad];

@@ -21,10 +21,14 @@ mod region;
 
 pub use exponential::{UnstableLoop, exponential};
 pub use lmi::{Affine, Program, Solution, SolveError};
-pub use problem::{AicGainValues, ArmValues, FamilyValues, Problem, ProblemError, SampledConstantValues};
+pub use problem::{
+    AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, ProblemError, SampledConstantValues, arm_ranges,
+};
 pub use region::{RegionOptions, region};
 
-use certune_verify::{Attained, Certificate, Claim, Document, Rejection, seal, verify};
+use certune_verify::{
+    Attained, Certificate, Claim, ClaimKind, Document, NotProvedClaim, Number, Reason, Rejection, seal, verify,
+};
 
 /// A document could not be turned into a certificate by its own checker: a defect of this crate, never of the input.
 #[derive(Debug, thiserror::Error)]
@@ -40,18 +44,14 @@ pub enum CertifyError {
     Unwritable(#[from] serde_json::Error),
 }
 
-/// Which claims to make.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Claims {
-    /// Only the linearised loops.
-    Exponential,
-    /// Only the nonlinear region.
-    Region,
-    /// Both.
-    All,
+/// How each kind of claim is searched.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Options {
+    /// The region of the nonlinear loop.
+    pub region: RegionOptions,
 }
 
-/// Makes the claims about a problem, and returns the sealed document and its verdict.
+/// Makes the claims about a problem, in the order asked for, and has them checked.
 ///
 /// `attain` is asked, after a refusal of `exponential`, for an arm and configuration of the family whose linearised loop is
 /// unstable; it may return `None`.
@@ -60,19 +60,26 @@ pub enum Claims {
 /// [`CertifyError`] when the checker does not accept the document, which would be a defect of this crate.
 pub fn certify(
     problem: &Problem,
-    claims: Claims,
-    options: &RegionOptions,
+    claims: &[ClaimKind],
+    options: &Options,
     attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>,
 ) -> Result<Certificate, CertifyError> {
-    let mut entries: Vec<Claim> = Vec::new();
-    if matches!(claims, Claims::Exponential | Claims::All) {
-        entries.push(exponential(problem, attain));
+    let mut document = problem.document().clone();
+    for kind in claims {
+        let claim = match kind {
+            ClaimKind::Exponential => exponential(problem, attain),
+            ClaimKind::Region => region(problem, &options.region),
+            other => not_proved(*other, Reason::FamilyNotCovered, None),
+        };
+        document.claims.push(claim.into());
     }
-    if matches!(claims, Claims::Region | Claims::All) {
-        entries.push(region(problem, options));
-    }
-    let document = seal(Document { claims: entries, ..problem.document().clone() });
-    Ok(verify(&to_json(&document)?)??)
+    let document = seal(document);
+    Ok(verify(&to_json(&document)?, problem.records())??)
+}
+
+/// An entry that says why there is neither a proof nor a counterexample.
+pub(crate) fn not_proved(of: ClaimKind, reason: Reason, distance: Option<f64>) -> Claim {
+    Claim::NotProved(NotProvedClaim { of, distance: distance.and_then(Number::decimal), reason })
 }
 
 /// The text of a sealed document, as it is written to a file.

@@ -3,7 +3,9 @@
 //! Gains are the decimals a person wrote: the shortest decimal of an `f64` is that text whenever it has at most 15 digits. Constants are
 //! rounded outward to four significant digits, so that the document is readable and no weaker assumption is stated than was sampled.
 
-use certune_verify::{AicGains, Arm, Constants, Document, Evidence, Family, Number, SampledSet};
+use certune_verify::{
+    AicGains, Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Evidence, Family, Gains, Number, Record,
+};
 
 /// Gains of the AIC, one number per joint.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,12 +67,78 @@ pub struct SampledConstantValues {
     pub k_c_kg_m2: f64,
     /// Coriolis constant against `dq'M dq`.
     pub k_r: f64,
+    /// Coriolis constant in the metric of M, 1/sqrt(kg m^2), when it was sampled.
+    pub k_m: Option<f64>,
+    /// Diagonals between which M lies, kg m^2, when they were sampled.
+    pub diagonal_kg_m2: Option<[Vec<f64>; 2]>,
+    /// Largest gravity torque of each joint, N m, when it was sampled.
+    pub gravity_torque_n_m: Option<Vec<f64>>,
     /// Share by which the constants were widened.
     pub margin: f64,
     /// Configurations sampled.
     pub samples: usize,
     /// Local maximisations.
     pub local_starts: usize,
+}
+
+/// The constants that a problem rests on.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ConstantValues {
+    /// Sampled: claims are conditional.
+    Sampled(SampledConstantValues),
+    /// Proved, in a record that covers the family.
+    Proved(Box<Record>),
+}
+
+impl AicGainValues {
+    /// The gains as they are written in a document.
+    ///
+    /// # Errors
+    /// [`ProblemError`] when a number cannot be written.
+    pub fn written(&self) -> Result<Gains, ProblemError> {
+        Ok(Gains::Aic(AicGains {
+            kappa_mu: numbers("kappa_mu", &self.kappa_mu)?,
+            kappa_a: numbers("kappa_a", &self.kappa_a)?,
+            sigma_q: numbers("sigma_q", &self.sigma_q)?,
+            sigma_dq: numbers("sigma_dq", &self.sigma_dq)?,
+            sigma_mu: numbers("sigma_mu", &self.sigma_mu)?,
+            sigma_dmu: numbers("sigma_dmu", &self.sigma_dmu)?,
+            reference_time_constant_s: numbers("reference_time_constant_s", &self.reference_time_constant_s)?,
+        }))
+    }
+}
+
+impl SampledConstantValues {
+    fn written(&self) -> Result<Constants, ProblemError> {
+        let list = |quantity, values: &[f64], outward| {
+            values.iter().map(|&value| rounded(quantity, value, outward)).collect::<Result<Vec<_>, _>>()
+        };
+        let diagonal = |[lower, upper]: &[Vec<f64>; 2]| {
+            Ok([list("diagonal_kg_m2", lower, -1.0)?, list("diagonal_kg_m2", upper, 1.0)?])
+        };
+        Ok(Constants {
+            over: ConfigurationSet::AllAngles,
+            bounds: Bounds {
+                m_lo_kg_m2: rounded("m_lo_kg_m2", self.m_lo_kg_m2, -1.0)?,
+                m_hi_kg_m2: rounded("m_hi_kg_m2", self.m_hi_kg_m2, 1.0)?,
+                k_g_n_m_per_rad: rounded("k_g_n_m_per_rad", self.k_g_n_m_per_rad, 1.0)?,
+                k_c_kg_m2: rounded("k_c_kg_m2", self.k_c_kg_m2, 1.0)?,
+                k_r: Some(rounded("k_r", self.k_r, 1.0)?),
+                k_m: self.k_m.map(|value| rounded("k_m", value, 1.0)).transpose()?,
+                diagonal_kg_m2: self.diagonal_kg_m2.as_ref().map(diagonal).transpose()?,
+                gravity_torque_n_m: self
+                    .gravity_torque_n_m
+                    .as_deref()
+                    .map(|values| list("gravity_torque_n_m", values, 1.0))
+                    .transpose()?,
+            },
+            evidence: Evidence::Sampled {
+                margin: number("margin", self.margin)?,
+                samples: self.samples,
+                local_starts: self.local_starts,
+            },
+        })
+    }
 }
 
 /// Why numbers make no problem.
@@ -90,6 +158,20 @@ pub enum ProblemError {
 #[derive(Clone, Debug)]
 pub struct Problem {
     document: Document,
+    records: Vec<Record>,
+}
+
+/// Masses, payloads and rotor inertias of a family, as they are written in documents and records.
+///
+/// # Errors
+/// [`ProblemError`] when a number cannot be written.
+pub fn arm_ranges(arm: &ArmValues, family: &FamilyValues) -> Result<ArmRanges, ProblemError> {
+    Ok(ArmRanges {
+        mass_uncertainty: number("mass_uncertainty", family.mass_uncertainty)?,
+        payload_kg: interval("payload_kg", family.payload_kg)?,
+        payload_com_m: coordinates(arm.payload_com_m)?,
+        rotor_inertia_kg_m2: interval("rotor_inertia_kg_m2", family.rotor_inertia_kg_m2)?,
+    })
 }
 
 fn number(quantity: &'static str, value: f64) -> Result<Number, ProblemError> {
@@ -126,15 +208,16 @@ impl Problem {
     /// A problem from plain numbers.
     ///
     /// # Errors
-    /// [`ProblemError`] when a number cannot be written. Whether gains are positive, intervals ordered and lists of the
-    /// right length is for the checker to say.
+    /// [`ProblemError`] when a number cannot be written. Whether gains are positive, intervals ordered, lists of the
+    /// right length and the family inside the record is for the checker to say.
     pub fn new(
         arm: &ArmValues,
-        gains: &AicGainValues,
+        gains: Gains,
         family: &FamilyValues,
-        constants: &SampledConstantValues,
+        constants: &ConstantValues,
     ) -> Result<Self, ProblemError> {
         let plain = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '_' };
+        let friction = interval("friction_n_m_s_per_rad", family.friction_n_m_s_per_rad)?;
         let document = Document {
             schema: 0,
             arm: Arm {
@@ -142,41 +225,34 @@ impl Problem {
                 joints: arm.joints,
                 sha256: arm.sha256.clone(),
             },
-            gains: AicGains {
-                kappa_mu: numbers("kappa_mu", &gains.kappa_mu)?,
-                kappa_a: numbers("kappa_a", &gains.kappa_a)?,
-                sigma_q: numbers("sigma_q", &gains.sigma_q)?,
-                sigma_dq: numbers("sigma_dq", &gains.sigma_dq)?,
-                sigma_mu: numbers("sigma_mu", &gains.sigma_mu)?,
-                sigma_dmu: numbers("sigma_dmu", &gains.sigma_dmu)?,
-                reference_time_constant_s: numbers("reference_time_constant_s", &gains.reference_time_constant_s)?,
-            },
+            gains,
             family: Family {
                 gravity_compensation: family.gravity_compensation,
-                friction_n_m_s_per_rad: interval("friction_n_m_s_per_rad", family.friction_n_m_s_per_rad)?,
-                mass_uncertainty: number("mass_uncertainty", family.mass_uncertainty)?,
-                payload_kg: interval("payload_kg", family.payload_kg)?,
-                payload_com_m: coordinates(arm.payload_com_m)?,
-                rotor_inertia_kg_m2: interval("rotor_inertia_kg_m2", family.rotor_inertia_kg_m2)?,
+                friction_n_m_s_per_rad: vec![friction; arm.joints],
+                arms: arm_ranges(arm, family)?,
             },
-            constants: Constants {
-                m_lo_kg_m2: rounded("m_lo_kg_m2", constants.m_lo_kg_m2, -1.0)?,
-                m_hi_kg_m2: rounded("m_hi_kg_m2", constants.m_hi_kg_m2, 1.0)?,
-                k_g_n_m_per_rad: rounded("k_g_n_m_per_rad", constants.k_g_n_m_per_rad, 1.0)?,
-                k_c_kg_m2: rounded("k_c_kg_m2", constants.k_c_kg_m2, 1.0)?,
-                k_r: rounded("k_r", constants.k_r, 1.0)?,
-                evidence: Evidence::Sampled {
-                    over: SampledSet::AllAngles,
-                    margin: number("margin", constants.margin)?,
-                    samples: constants.samples,
-                    local_starts: constants.local_starts,
+            constants: match constants {
+                ConstantValues::Sampled(values) => values.written()?,
+                ConstantValues::Proved(record) => Constants {
+                    over: record.over.clone(),
+                    bounds: record.bounds.clone(),
+                    evidence: Evidence::Proved { record_sha256: record.sha256.clone() },
                 },
             },
             about: String::new(),
             claims: Vec::new(),
             sha256: String::new(),
         };
-        Ok(Self { document })
+        let records = match constants {
+            ConstantValues::Sampled(_) => Vec::new(),
+            ConstantValues::Proved(record) => vec![record.as_ref().clone()],
+        };
+        Ok(Self { document, records })
+    }
+
+    /// The records that the document's constants rest on; none when they were sampled.
+    pub fn records(&self) -> &[Record] {
+        &self.records
     }
 
     /// The document without claims.

@@ -6,9 +6,7 @@
 //! the coordinates `(dq, z, f, w)`, and `dV/dt` is a sum of products of rows. Coordinates are scaled (`dq` by `1/sqrt m`, `u~` by
 //! the torque's own size), without which the solver loses digits.
 
-use certune_verify::{
-    Claim, ClaimKind, Document, Grade, NotProvedClaim, Number, Reason, RegionClaim, RegionWitness, region_inequalities,
-};
+use certune_verify::{Claim, ClaimKind, Document, Number, Reason, RegionClaim, RegionWitness, region_inequalities};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use crate::lmi::{Affine, Program, SolveError};
@@ -55,12 +53,13 @@ struct Numbers {
     friction: [f64; 2],
     stiffness: f64,
     coriolis: f64,
-    coriolis_relative: f64,
+    /// `None`: the cubic term must rest on the absolute bound alone.
+    coriolis_relative: Option<f64>,
 }
 
 impl Numbers {
     fn new(document: &Document) -> Option<Self> {
-        let g = &document.gains;
+        let g = document.gains.aic().ok()?;
         let [kappa_mu, kappa_a, sq, sdq, smu, sdmu, t] =
             [&g.kappa_mu, &g.kappa_a, &g.sigma_q, &g.sigma_dq, &g.sigma_mu, &g.sigma_dmu, &g.reference_time_constant_s]
                 .map(|list| list.first().map_or(f64::NAN, Number::to_f64));
@@ -81,16 +80,16 @@ impl Numbers {
         matrix.set_row(3, &(&second * -c));
         matrix.set_row(4, &((&position / sq + &velocity / sdq) * (-kappa_a / torque_unit)));
         input[4] = -kappa_a / sdq / torque_unit;
-        let k = &document.constants;
+        let k = &document.constants.bounds;
         let numbers = Self {
             a: matrix,
             b: input,
             torque_unit,
             inertia: [k.m_lo_kg_m2.to_f64(), k.m_hi_kg_m2.to_f64()],
-            friction: document.family.friction_n_m_s_per_rad.clone().map(|x| x.to_f64()),
+            friction: document.family.friction_hull().map(|x| x.to_f64()),
             stiffness: if document.family.gravity_compensation { 0.0 } else { k.k_g_n_m_per_rad.to_f64() },
             coriolis: k.k_c_kg_m2.to_f64(),
-            coriolis_relative: k.k_r.to_f64(),
+            coriolis_relative: k.k_r.as_ref().map(Number::to_f64),
         };
         numbers.a.iter().chain(numbers.b.iter()).all(|x| x.is_finite()).then_some(numbers)
     }
@@ -134,7 +133,10 @@ impl Numbers {
         for (i, j, s) in entries(x) {
             form += twice(&z[i], &z_dot[j]) * s;
         }
-        let cubic = rho * (x[THETA] * self.coriolis + (1.0 - x[THETA]) * self.coriolis_relative * m);
+        let cubic = match self.coriolis_relative {
+            Some(relative) => rho * (x[THETA] * self.coriolis + (1.0 - x[THETA]) * relative * m),
+            None => rho * self.coriolis,
+        };
         form += twice(&dq, &dq) * cubic;
         let mut value = twice(&dq, &dq) * (0.5 * m * x[P]) + twice(&dq, &y) * m;
         for (i, j, s) in entries(x) {
@@ -199,6 +201,7 @@ impl Numbers {
             (!self.has_friction()).then_some(FRICTION),
             (!self.has_gravity()).then_some(GRAVITY),
             (!self.has_gravity()).then_some(START),
+            self.coriolis_relative.is_none().then_some(THETA),
         ];
         for k in unused.into_iter().flatten() {
             blocks.push(Box::new(move |x| DMatrix::from_element(1, 1, -x[k])));
@@ -222,7 +225,10 @@ fn entries(x: &[f64]) -> impl Iterator<Item = (usize, usize, f64)> {
 /// The claim `region` with the largest radius found, or "not proved".
 pub fn region(problem: &Problem, options: &RegionOptions) -> Claim {
     let document = problem.document();
-    if document.gains.shared_by_all().is_err() {
+    let Ok(gains) = document.gains.aic() else {
+        return not_proved(Reason::OtherController, None);
+    };
+    if gains.shared_by_all().is_err() {
         return not_proved(Reason::UnequalGains, None);
     }
     let Some(numbers) = Numbers::new(document) else {
@@ -305,8 +311,6 @@ fn candidate(numbers: &Numbers, x: &[f64], rho: f64, rate: f64, shrink: f64) -> 
     let multiplier = |k: usize, unit: f64| Number::dyadic((x[k] * unit).max(0.0));
     let radius = (1.0 - shrink) / x[OBJECTIVE].sqrt();
     Some(RegionClaim {
-        statement: String::new(),
-        grade: Grade::Conditional,
         radius_rad: Number::decimal((radius * 1e4).floor() / 1e4)?,
         rate_per_s: Number::decimal(rate)?,
         witness: RegionWitness {
@@ -314,7 +318,7 @@ fn candidate(numbers: &Numbers, x: &[f64], rho: f64, rate: f64, shrink: f64) -> 
             b: b.try_into().ok()?,
             s,
             rho: Number::dyadic(rho)?,
-            theta: Number::dyadic(x[THETA].clamp(0.0, 1.0))?,
+            theta: Number::dyadic(if numbers.coriolis_relative.is_some() { x[THETA].clamp(0.0, 1.0) } else { 1.0 })?,
             friction_multiplier: multiplier(FRICTION, 1.0)?,
             gravity_multiplier: multiplier(GRAVITY, 1.0)?,
             // The start was scaled to torques in units of k_g.
@@ -324,12 +328,7 @@ fn candidate(numbers: &Numbers, x: &[f64], rho: f64, rate: f64, shrink: f64) -> 
 }
 
 fn not_proved(reason: Reason, distance: Option<f64>) -> Claim {
-    Claim::NotProved(NotProvedClaim {
-        statement: String::new(),
-        of: ClaimKind::Region,
-        distance: distance.and_then(Number::decimal),
-        reason,
-    })
+    crate::not_proved(ClaimKind::Region, reason, distance)
 }
 
 impl Numbers {

@@ -2,9 +2,9 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
 use certune_certify::{
-    AicGainValues, ArmValues, Claims, FamilyValues, Problem, RegionOptions, SampledConstantValues, certify,
+    AicGainValues, ArmValues, ConstantValues, FamilyValues, Options, Problem, SampledConstantValues, certify,
 };
-use certune_verify::{Certificate, Claim, Verdict};
+use certune_verify::{Certificate, Claim, ClaimKind, Verdict};
 
 fn problem(kappa_a: f64, compensated: bool, friction: [f64; 2], margin: f64) -> Problem {
     let all = |x: f64| vec![x; 7];
@@ -33,19 +33,22 @@ fn problem(kappa_a: f64, compensated: bool, friction: [f64; 2], margin: f64) -> 
         k_g_n_m_per_rad: 69.28 * up,
         k_c_kg_m2: 2.254 * up,
         k_r: 4.962 * up,
+        k_m: None,
+        diagonal_kg_m2: None,
+        gravity_torque_n_m: None,
         margin,
         samples: 1,
         local_starts: 1,
     };
-    Problem::new(&arm, &gains, &family, &constants).unwrap()
+    Problem::new(&arm, gains.written().unwrap(), &family, &ConstantValues::Sampled(constants)).unwrap()
 }
 
-fn claims(problem: &Problem, claims: Claims) -> Certificate {
-    certify(problem, claims, &RegionOptions::default(), &|| None).unwrap()
+fn claims(problem: &Problem, claim: ClaimKind) -> Certificate {
+    certify(problem, &[claim], &Options::default(), &|| None).unwrap()
 }
 
 fn radius(problem: &Problem) -> f64 {
-    match &claims(problem, Claims::Region).document().claims[0] {
+    match &claims(problem, ClaimKind::Region).document().claims[0].claim {
         Claim::Region(c) => c.radius_rad.to_f64(),
         other => panic!("{other:?}"),
     }
@@ -53,15 +56,15 @@ fn radius(problem: &Problem) -> f64 {
 
 #[test]
 fn published_gains_decay_without_gravity_compensation() {
-    let certificate = claims(&problem(700.0, false, [0.0, 0.0], 0.05), Claims::Exponential);
-    let Claim::Exponential(claim) = &certificate.document().claims[0] else { panic!() };
+    let certificate = claims(&problem(700.0, false, [0.0, 0.0], 0.05), ClaimKind::Exponential);
+    let Claim::Exponential(claim) = &certificate.document().claims[0].claim else { panic!() };
     println!("rate {}", claim.rate_per_s);
     assert!(claim.rate_per_s.to_f64() >= 0.7, "{}", claim.rate_per_s);
 }
 
 #[test]
 fn a_weak_torque_gain_without_compensation_is_refused() {
-    let certificate = claims(&problem(200.0, false, [0.0, 0.0], 0.05), Claims::Exponential);
+    let certificate = claims(&problem(200.0, false, [0.0, 0.0], 0.05), ClaimKind::Exponential);
     assert_eq!(certificate.checked()[0].verdict, Verdict::Refused);
 }
 

@@ -4,7 +4,7 @@ use certune_bounds::{
     ArmBox, Axis, BoundsError, Ranges, SampledConstants, SamplingOptions, SearchOptions, maximise, sampled_constants,
 };
 use certune_certify::{
-    AicGainValues, ArmValues, CertifyError, Claims, FamilyValues, Problem, ProblemError, RegionOptions,
+    AicGainValues, ArmValues, CertifyError, ConstantValues, FamilyValues, Options, Problem, ProblemError,
     SampledConstantValues, UnstableLoop, certify, to_json,
 };
 use certune_closed_loop::{PlantBox, PlantError, linearise_aic};
@@ -12,7 +12,7 @@ use certune_control::ParamError;
 use certune_control::aic::{AicGains, AicParams};
 use certune_dynamics::{Model, Payload, Robot, RobotError, gravity_jacobian, mass_matrix};
 use certune_linsys::{Continuous, Joints, Loop, LoopError};
-use certune_verify::{Attained, Certificate, Number};
+use certune_verify::{Attained, Certificate, ClaimKind, Number};
 use nalgebra::{Complex, DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
@@ -75,8 +75,8 @@ pub fn family_of(plant_box: &PlantBox) -> Result<FamilyValues, StabilityError> {
 /// How hard a certificate is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Effort {
-    /// The region of the nonlinear loop.
-    pub region: RegionOptions,
+    /// The search for proofs.
+    pub proofs: Options,
     /// The arm and configuration of a refusal.
     pub counterexample: SearchOptions,
 }
@@ -92,7 +92,7 @@ impl Default for Effort {
             enough: 0.05,
             ..SearchOptions::default()
         };
-        Self { region: RegionOptions::default(), counterexample }
+        Self { proofs: Options::default(), counterexample }
     }
 }
 
@@ -146,7 +146,7 @@ impl<const N: usize> ArmCertifier<N> {
     ///
     /// # Errors
     /// When the gains are not valid; [`StabilityError::Certify`] would be a defect of this workspace.
-    pub fn certify(&self, gains: &AicGains<N>, claims: Claims) -> Result<Certificate, StabilityError> {
+    pub fn certify(&self, gains: &AicGains<N>, claims: &[ClaimKind]) -> Result<Certificate, StabilityError> {
         self.certify_with(gains, claims, &Effort::default())
     }
 
@@ -157,27 +157,30 @@ impl<const N: usize> ArmCertifier<N> {
     pub fn certify_with(
         &self,
         gains: &AicGains<N>,
-        claims: Claims,
+        claims: &[ClaimKind],
         effort: &Effort,
     ) -> Result<Certificate, StabilityError> {
         let params = AicParams::new(gains, STEP_S)?;
-        let problem = Problem::new(&self.arm, &gain_values(gains), &self.family, &self.constant_values())?;
+        let problem = Problem::new(&self.arm, gain_values(gains).written()?, &self.family, &self.constant_values())?;
         let attain = || self.unstable_member(&params, &effort.counterexample).ok().flatten();
-        Ok(certify(&problem, claims, &effort.region, &attain)?)
+        Ok(certify(&problem, claims, &effort.proofs, &attain)?)
     }
 
-    fn constant_values(&self) -> SampledConstantValues {
+    fn constant_values(&self) -> ConstantValues {
         let s = &self.sampled;
-        SampledConstantValues {
+        ConstantValues::Sampled(SampledConstantValues {
             m_lo_kg_m2: s.constants.m_lo_kg_m2,
             m_hi_kg_m2: s.constants.m_hi_kg_m2,
             k_g_n_m_per_rad: s.constants.k_g_n_m_per_rad,
             k_c_kg_m2: s.constants.k_c_kg_m2,
             k_r: s.constants.k_r,
+            k_m: None,
+            diagonal_kg_m2: None,
+            gravity_torque_n_m: Some(s.gravity_torque_n_m.clone()),
             margin: s.margin,
             samples: s.samples,
             local_starts: s.local_starts,
-        }
+        })
     }
 
     /// Searches the family for a member, configuration and friction whose linearised loop is unstable.

@@ -41,18 +41,18 @@ pub struct Model<const N: usize, T: Real = f64> {
     pub(crate) flange_position: Vector3<T>,
 }
 
-/// The numbers of one link as the recursions use them, for whoever needs them exactly as they are.
+/// The numbers of one link that enter the recursions, for methods that need them one by one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LinkNumbers {
-    /// Row-major rotation R0: columns are the joint frame's axes in the parent link at q = 0; the joint turns about its z.
+pub struct LinkConstants {
+    /// Joint frame in the parent link at q = 0: row-major rotation, columns are the frame's axes.
     pub rotation: [[f64; 3]; 3],
-    /// Origin of the joint frame in the parent link, m.
+    /// Joint frame in the parent link at q = 0: origin, m.
     pub position_m: [f64; 3],
     /// Mass, kg.
     pub mass_kg: f64,
     /// Mass times centre of mass, in the link's frame, kg m.
     pub first_moment_kg_m: [f64; 3],
-    /// Inertia about the link's origin: xx, yy, zz, xy, xz, yz, kg m^2.
+    /// Inertia about the origin of the link's frame: xx, yy, zz, xy, xz, yz, kg m^2.
     pub about_origin_kg_m2: [f64; 6],
 }
 
@@ -149,18 +149,24 @@ impl<const N: usize> Model<N> {
         core::array::from_fn(|i| self.links[i].body.mass)
     }
 
-    /// The numbers of every link, base to tip.
-    pub fn link_numbers(&self) -> [LinkNumbers; N] {
-        self.links.map(|link| {
-            let (r, about) = (link.rotation, link.body.about_origin);
-            LinkNumbers {
-                rotation: core::array::from_fn(|row| core::array::from_fn(|column| r[(row, column)])),
-                position_m: link.position.into(),
-                mass_kg: link.body.mass,
-                first_moment_kg_m: link.body.first_moment.into(),
-                about_origin_kg_m2: [about.xx, about.yy, about.zz, about.xy, about.xz, about.yz],
+    /// Frames and bodies of all links, base to tip.
+    pub fn link_constants(&self) -> [LinkConstants; N] {
+        core::array::from_fn(|i| {
+            let CompiledLink { rotation: r, position, body } = self.links[i];
+            let inertia = body.about_origin;
+            LinkConstants {
+                rotation: core::array::from_fn(|a| core::array::from_fn(|b| r[(a, b)])),
+                position_m: position.into(),
+                mass_kg: body.mass,
+                first_moment_kg_m: body.first_moment.into(),
+                about_origin_kg_m2: [inertia.xx, inertia.yy, inertia.zz, inertia.xy, inertia.xz, inertia.yz],
             }
         })
+    }
+
+    /// Acceleration of a falling body in the base frame, m/s^2.
+    pub fn gravity_m_per_s2(&self) -> [f64; 3] {
+        self.gravity.into()
     }
 
     /// The same arm in every lane of another scalar.

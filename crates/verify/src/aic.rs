@@ -25,7 +25,7 @@ use num_rational::BigRational;
 use num_traits::{One, Zero};
 use serde::{Deserialize, Serialize};
 
-use crate::error::Rejection;
+use crate::error::Flaw;
 use crate::number::{Number, positive};
 
 /// States of one joint's controller: e, m, mu', mu'', u~.
@@ -67,38 +67,34 @@ impl AicGains {
     /// Whether every joint has the same, positive gains.
     ///
     /// # Errors
-    /// [`Rejection`] with the gain that is not positive, missing, or different between joints.
-    pub fn shared_by_all(&self) -> Result<(), Rejection> {
+    /// [`Flaw`] with the gain that is not positive, missing, or different between joints.
+    pub fn shared_by_all(&self) -> Result<(), Flaw> {
         self.shared(self.kappa_mu.len()).map(|_| ())
     }
 
     /// The gains that every joint shares.
     ///
     /// # Errors
-    /// [`Rejection`] when a list has the wrong length, a gain is not positive, or joints differ.
-    pub(crate) fn shared(&self, joints: usize) -> Result<SharedGains, Rejection> {
+    /// [`Flaw`] when a list has the wrong length, a gain is not positive, or joints differ.
+    pub(crate) fn shared(&self, joints: usize) -> Result<SharedGains, Flaw> {
         let mut values = Vec::with_capacity(7);
         for (gain, list) in self.named() {
             if list.len() != joints {
-                return Err(Rejection::Length { quantity: gain, found: list.len(), expected: joints });
+                return Err(Flaw::Length { quantity: gain, found: list.len(), expected: joints });
             }
             let Some(first) = list.first() else {
-                return Err(Rejection::Length { quantity: gain, found: 0, expected: joints });
+                return Err(Flaw::Length { quantity: gain, found: 0, expected: joints });
             };
             if let Some(bad) = list.iter().find(|x| !positive(x.value())) {
-                return Err(Rejection::Quantity {
-                    quantity: gain,
-                    value: bad.to_string(),
-                    expected: "a positive number",
-                });
+                return Err(Flaw::Quantity { quantity: gain, value: bad.to_string(), expected: "a positive number" });
             }
             if list.iter().any(|x| x.value() != first.value()) {
-                return Err(Rejection::UnequalGains { gain });
+                return Err(Flaw::UnequalGains { gain });
             }
             values.push(first.value().clone());
         }
         let [kappa_mu, kappa_a, sigma_q, sigma_dq, sigma_mu, sigma_dmu, time_constant] = &values[..] else {
-            return Err(Rejection::Empty);
+            return Err(Flaw::Length { quantity: "gains", found: values.len(), expected: 7 });
         };
         Ok(SharedGains {
             a: kappa_mu / sigma_q,

@@ -51,31 +51,14 @@ pub enum Rejection {
         "the text is not in the form in which certificates are written: a field is missing or spelled in another way"
     )]
     Form,
-    /// A quantity is outside what the claim's proof allows.
-    #[error("{quantity} is {value}, expected {expected}")]
-    Quantity {
-        /// Name of the quantity, as in the file.
-        quantity: &'static str,
-        /// As written.
-        value: String,
-        /// What the proof needs.
-        expected: &'static str,
-    },
-    /// Lists of gains differ in length from the arm.
-    #[error("{quantity} has {found} entries, the arm has {expected} joints")]
-    Length {
-        /// Name of the list.
-        quantity: &'static str,
-        /// Entries in the file.
-        found: usize,
-        /// Joints of the arm.
-        expected: usize,
-    },
-    /// The claim's proof needs the same gains on every joint.
-    #[error("{gain} differs between joints: this claim is proved only for equal gains on every joint")]
-    UnequalGains {
-        /// The gain that differs.
-        gain: &'static str,
+    /// Gains, family or constants are none.
+    #[error(transparent)]
+    Head(#[from] Flaw),
+    /// The constants are said to be proved, and the record that would prove them is unknown or says something else.
+    #[error("the constants are not those of a known record: {reason}")]
+    Record {
+        /// What differs.
+        reason: String,
     },
     /// The description is not that of the numbers.
     #[error("the description is not the one its numbers make; they say: {derived}")]
@@ -99,28 +82,85 @@ pub enum Rejection {
         /// What the constants rest on.
         allowed: &'static str,
     },
-    /// A matrix inequality of the proof is false.
-    #[error("claim {index}: the inequality `{inequality}` does not hold")]
-    Inequality {
+    /// The proof of a claim does not stand.
+    #[error("claim {index}: {flaw}")]
+    Claim {
         /// Position of the claim, from 1.
         index: usize,
+        /// Where it fails.
+        flaw: Flaw,
+    },
+}
+
+/// What is wrong with a number, or with a proof.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Flaw {
+    /// A quantity is outside what the claim's proof allows.
+    #[error("{quantity} is {value}, expected {expected}")]
+    Quantity {
+        /// Name of the quantity, as in the file.
+        quantity: &'static str,
+        /// As written.
+        value: String,
+        /// What the proof needs.
+        expected: &'static str,
+    },
+    /// A list has the wrong length.
+    #[error("{quantity} has {found} entries, expected {expected}")]
+    Length {
+        /// Name of the list.
+        quantity: &'static str,
+        /// Entries in the file.
+        found: usize,
+        /// How many there must be: one per joint, or as many as a matrix has.
+        expected: usize,
+    },
+    /// The claim's proof needs the same gains on every joint.
+    #[error("{gain} differs between joints: this claim is proved only for equal gains on every joint")]
+    UnequalGains {
+        /// The gain that differs.
+        gain: &'static str,
+    },
+    /// The claim is about the other controller.
+    #[error("this claim is about {expected}")]
+    Controller {
+        /// The controller it is about.
+        expected: &'static str,
+    },
+    /// The claim's proof needs a constant that the document does not give.
+    #[error("the proof needs the constant {constant}, which the document does not give")]
+    Missing {
+        /// Its name.
+        constant: &'static str,
+    },
+    /// The claim's proof does not cover the family or the set of configurations.
+    #[error("the proof does not cover {what}")]
+    NotCovered {
+        /// What is outside.
+        what: &'static str,
+    },
+    /// A matrix inequality of the proof is false.
+    #[error("the inequality `{inequality}` does not hold")]
+    Inequality {
         /// Name of the inequality.
         inequality: String,
     },
-    /// The polynomial family is not shown stable.
-    #[error("claim {index}: {reason}")]
+    /// A polynomial family is not shown stable.
+    #[error("{reason}")]
     Polynomial {
-        /// Position of the claim, from 1.
-        index: usize,
         /// Where the proof stops.
         reason: String,
     },
     /// A refusal whose counterexample is none.
-    #[error("claim {index}: the counterexample is no counterexample: {reason}")]
+    #[error("the counterexample is no counterexample: {reason}")]
     Counterexample {
-        /// Position of the claim, from 1.
-        index: usize,
         /// Why.
         reason: &'static str,
     },
+}
+
+impl Flaw {
+    pub(crate) fn quantity(quantity: &'static str, value: &str, expected: &'static str) -> Self {
+        Self::Quantity { quantity, value: value.chars().take(64).collect(), expected }
+    }
 }

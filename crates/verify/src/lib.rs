@@ -8,12 +8,14 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `number` | decimals and dyadics as written, and the rational numbers they are |
+//! | `quantity` | what a number must be before anything is derived from it |
 //! | `algebra` | characteristic polynomial, Hurwitz determinants, Sturm sequences, LDL' |
-//! | `aic` | the controller's matrices from its gains |
-//! | `exponential` | claim: every linearised loop of a box decays at a rate |
-//! | `region` | claim: the nonlinear loop decays from every start in a ball |
+//! | `form` | quadratic forms assembled from linear ones |
+//! | `aic`, `gains` | the controllers' gains, and the AIC's matrices |
+//! | `claims` | one file for each kind of claim: what it states, its words, its proof |
 //! | `document` | the file |
-//! | `statement` | the words of a claim, from its numbers |
+//! | `record` | proved constants of an arm, referred to by their hash |
+//! | `statement` | what a document is about, in words |
 //! | `check` | seal and hash, and the verdict on a file |
 //!
 //! The mathematics of each claim is in `proofs/claims/`.
@@ -22,21 +24,26 @@
 mod aic;
 mod algebra;
 mod check;
+mod claims;
 mod document;
 mod error;
-mod exponential;
+mod form;
+mod gains;
 mod number;
-mod region;
+mod quantity;
+mod record;
 mod statement;
 
 pub use aic::AicGains;
-pub use check::{Certificate, Checked, Verdict, family_box, seal, verify};
-pub use document::{
-    Arm, Attained, BoxPoint, Claim, ClaimKind, Constants, Document, Evidence, ExponentialClaim, Family, Grade,
-    NotProvedClaim, Reason, RefusedClaim, RegionClaim, RegionWitness, SampledSet,
+pub use check::{Certificate, Checked, seal, verify};
+pub use claims::{
+    Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, Figure, Inequality, LoopBox, LoopFamily, NotProvedClaim,
+    Reason, RefusedClaim, RegionClaim, RegionWitness, Verdict, family_box, region_inequalities,
 };
-pub use error::{Rejection, VerifyError};
-pub use exponential::{LoopBox, LoopFamily};
+pub use document::{Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade};
+pub use error::{Flaw, Rejection, VerifyError};
+pub use form::{Field, Form, Row};
+pub use gains::{Gains, MracGains, MracLaw};
 pub use number::{Number, NumberError};
-pub use region::{Inequality, region_inequalities};
+pub use record::{BoundProof, Record};
 pub use statement::Assumption;

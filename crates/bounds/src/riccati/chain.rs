@@ -9,7 +9,7 @@
 //! `(0, 0, c)` of the link's frame. The test for this is exact: quarter turns and a sum that does not round. Without the
 //! restriction, unreachable directions would take part in the Loewner order and spoil the bounds.
 
-use certune_dynamics::LinkNumbers;
+use certune_dynamics::LinkConstants;
 
 use super::ball::{Ball, Matrix, ROUNDING, ZERO, largest};
 use super::turn::Passage;
@@ -35,7 +35,7 @@ pub(crate) struct Chain<const N: usize> {
 }
 
 /// `[w; u] -> wrench` of a body: `[[I, ĥ], [ĥ', m 1]]`, scaled.
-fn inertia(link: &LinkNumbers, scale: f64) -> Matrix {
+fn inertia(link: &LinkConstants, scale: f64) -> Matrix {
     let [xx, yy, zz, xy, xz, yz] = link.about_origin_kg_m2;
     let [x, y, z] = link.first_moment_kg_m;
     let m = link.mass_kg;
@@ -57,7 +57,7 @@ fn plus(a: &Matrix, b: &Matrix) -> Ball {
 }
 
 /// `X` of a link: six rows and columns.
-fn motion(link: &LinkNumbers) -> Ball {
+fn motion(link: &LinkConstants) -> Ball {
     let (r, [x, y, z]) = (&link.rotation, link.position_m);
     let skew = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]];
     let mut middle = ZERO;
@@ -81,7 +81,7 @@ fn is_quarter_turn(rotation: &[[f64; 3]; 3]) -> bool {
 }
 
 /// Where the point `(0, 0, at)` of the parent lies on this link's axis, if it does so exactly.
-fn point_on_axis(link: &LinkNumbers, at: f64) -> Option<f64> {
+fn point_on_axis(link: &LinkConstants, at: f64) -> Option<f64> {
     let [x, y, z] = link.position_m;
     // Knuth's two-sum: `rounding` is exactly what the subtraction lost.
     let difference = at - z;
@@ -132,8 +132,8 @@ impl<const N: usize> Chain<N> {
     /// The arm of `arms` with its payload at the lower (0) or upper (1) end.
     pub fn new(arms: &ArmBox<N>, payload_end: usize) -> Self {
         let groups = arms.groups();
-        let base = arms.base().link_numbers();
-        let payload = groups.get(N).map(|group| (group.model.link_numbers(), group.scale[payload_end]));
+        let base = arms.base().link_constants();
+        let payload = groups.get(N).map(|group| (group.model.link_constants(), group.scale[payload_end]));
         let rotor = arms.rotor_inertia_kg_m2()[0];
         // The fixed point of a shoulder, as a height on the current axis.
         let mut fixed: Option<f64> = None;

@@ -17,12 +17,65 @@ use num_bigint::BigInt;
 use num_rational::BigRational;
 use num_traits::Signed;
 
+use serde::{Deserialize, Serialize};
+
+use super::{CONTINUOUS, ClaimKind, Figure, Inequality, Provable};
 use crate::aic::{AicGains, SharedGains};
 use crate::algebra::{Polynomial, characteristic_polynomial, common_integers, hurwitz_determinant, is_hurwitz, zeros};
-use crate::error::Rejection;
+use crate::document::Document;
+use crate::error::Flaw;
 use crate::number::{Number, positive};
+use crate::quantity::require_positive;
 
 const DEGREE: usize = 6;
+
+/// Every linearised loop of the family decays at a rate.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExponentialClaim {
+    /// Certified decay rate, 1/s.
+    pub rate_per_s: Number,
+}
+
+impl Provable for ExponentialClaim {
+    fn kind(&self) -> ClaimKind {
+        ClaimKind::Exponential
+    }
+
+    fn sentence(&self, _: &Document) -> String {
+        format!(
+            "linearised at rest at any configuration, the loop is exponentially stable, every mode decaying faster than exp(-{} t), t in s",
+            self.rate_per_s
+        )
+    }
+
+    fn scope(&self, _: &Document) -> String {
+        CONTINUOUS.to_owned()
+    }
+
+    fn figures(&self) -> Vec<Figure> {
+        vec![Figure { name: "rate", value: self.rate_per_s.clone(), unit: "1/s" }]
+    }
+
+    fn prove(&self, document: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
+        require_positive("rate_per_s", &self.rate_per_s)?;
+        LoopFamily::new(document.gains.aic()?)?
+            .decays_on(&family_box(document), self.rate_per_s.value())
+            .map_err(|reason| Flaw::Polynomial { reason })?;
+        Ok(Vec::new())
+    }
+}
+
+/// The box of linearised loops that the family's constants span.
+pub fn family_box(document: &Document) -> LoopBox {
+    let bounds = &document.constants.bounds;
+    let stiffness = if document.family.gravity_compensation { Number::zero() } else { bounds.k_g_n_m_per_rad.clone() };
+    LoopBox {
+        inertia: [bounds.m_lo_kg_m2.clone(), bounds.m_hi_kg_m2.clone()],
+        friction: document.family.friction_hull(),
+        stiffness: [stiffness.negated(), stiffness],
+    }
+}
 
 /// Ranges of inertia (kg m^2), viscous friction (N m s/rad) and gravity stiffness (N m/rad), each `[lower, upper]`.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,8 +107,8 @@ impl LoopFamily {
     /// The loops of these gains.
     ///
     /// # Errors
-    /// [`Rejection`] when a gain is missing, not positive, or not the same on every joint.
-    pub fn new(gains: &AicGains) -> Result<Self, Rejection> {
+    /// [`Flaw`] when a gain is missing, not positive, or not the same on every joint.
+    pub fn new(gains: &AicGains) -> Result<Self, Flaw> {
         let shared = gains.shared(gains.kappa_mu.len())?;
         let at = |m: i64, d: i64, g: i64| polynomial(&shared, [m, d, g].map(|x| BigRational::from_integer(x.into())));
         let minus = |x: &[BigRational], y: &[BigRational]| x.iter().zip(y).map(|(x, y)| x - y).collect::<Vec<_>>();

@@ -1,0 +1,1 @@
+//! Bounds against random members, against dense grids, and the rounding argument against exact arithmetic.

@@ -1,0 +1,180 @@
+//! The kinds of claims. Each file holds what one kind states, its words, and its proof.
+
+mod exponential;
+mod not_proved;
+mod refused;
+mod region;
+
+use num_rational::BigRational;
+use serde::{Deserialize, Serialize};
+
+use crate::algebra::{Matrix, positive_definite_pivots};
+use crate::document::Document;
+use crate::error::Flaw;
+use crate::number::Number;
+
+pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
+pub use not_proved::{NotProvedClaim, Reason};
+pub use refused::{Attained, BoxPoint, RefusedClaim};
+pub use region::{RegionClaim, RegionWitness, region_inequalities};
+
+/// What an entry of a document claims.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum Claim {
+    /// Every linearised loop of the family decays at a rate.
+    Exponential(ExponentialClaim),
+    /// The nonlinear loop decays from every start in a ball.
+    Region(Box<RegionClaim>),
+    /// A claim that does not hold for the family's box, with the point that breaks it.
+    Refused(Box<RefusedClaim>),
+    /// A claim for which no proof was found, and no counterexample either.
+    NotProved(NotProvedClaim),
+}
+
+impl Claim {
+    pub(crate) fn provable(&self) -> &dyn Provable {
+        match self {
+            Self::Exponential(claim) => claim,
+            Self::Region(claim) => claim.as_ref(),
+            Self::Refused(claim) => claim.as_ref(),
+            Self::NotProved(claim) => claim,
+        }
+    }
+
+    /// The kind: of a refusal, what was refused.
+    pub fn kind(&self) -> ClaimKind {
+        self.provable().kind()
+    }
+
+    /// What a checked entry of this kind amounts to.
+    pub fn verdict(&self) -> Verdict {
+        match self {
+            Self::Refused(_) => Verdict::Refused,
+            Self::NotProved(_) => Verdict::NotProved,
+            Self::Exponential(_) | Self::Region(_) => Verdict::Holds,
+        }
+    }
+
+    /// The figures of the claim, the most telling first.
+    pub fn figures(&self) -> Vec<Figure> {
+        self.provable().figures()
+    }
+}
+
+/// The kinds of claims.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ClaimKind {
+    /// Every linearised loop of the family decays at a rate.
+    Exponential,
+    /// Every linearised loop of the family decays when the controller is sampled and delayed.
+    Sampled,
+    /// The nonlinear loop decays from every start in a ball.
+    Region,
+    /// The same with gains, frictions and limits of each joint.
+    JointRegion,
+    /// The nonlinear sampled loop decays from every start in a ball.
+    SampledRegion,
+    /// The state stays in a region while the goal moves.
+    MovingGoal,
+    /// The error is bounded under bounded noise and pushes.
+    Disturbance,
+    /// A linear loop, or a polytope of loops, decays.
+    Lyapunov,
+    /// The adaptive loop's error converges.
+    AdaptiveConvergence,
+    /// The adaptive loop decays when its adaptation is frozen.
+    PiExponential,
+}
+
+impl ClaimKind {
+    /// The name as it is written in files and flags.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Exponential => "exponential",
+            Self::Sampled => "sampled",
+            Self::Region => "region",
+            Self::JointRegion => "joint-region",
+            Self::SampledRegion => "sampled-region",
+            Self::MovingGoal => "moving-goal",
+            Self::Disturbance => "disturbance",
+            Self::Lyapunov => "lyapunov",
+            Self::AdaptiveConvergence => "adaptive-convergence",
+            Self::PiExponential => "pi-exponential",
+        }
+    }
+}
+
+/// What became of one entry.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The claim holds, with its grade.
+    Holds,
+    /// The claim is refused and the counterexample stands.
+    Refused,
+    /// The entry itself says that nothing was proved.
+    NotProved,
+}
+
+/// A number that a claim is about.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Figure {
+    /// What it is.
+    pub name: &'static str,
+    /// The number as written in the claim.
+    pub value: Number,
+    /// Its unit, `1` when it has none.
+    pub unit: &'static str,
+}
+
+/// A positive definite matrix of a proof, with the smallest pivot of its LDL'.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Inequality {
+    /// What it says, and where (at which end of an interval, for which joint).
+    pub name: String,
+    /// Order of the matrix.
+    pub order: usize,
+    /// The smallest pivot of LDL', `None` when the matrix is not positive definite.
+    pub smallest_pivot: Option<BigRational>,
+}
+
+impl Inequality {
+    /// Decides by exact LDL' whether the matrix is positive definite.
+    pub(crate) fn decide(name: String, matrix: &Matrix) -> Self {
+        let smallest_pivot = positive_definite_pivots(matrix).and_then(|pivots| pivots.into_iter().min());
+        Self { name, order: matrix.len(), smallest_pivot }
+    }
+}
+
+/// Every inequality, or the first that does not hold.
+pub(crate) fn all_hold(inequalities: Vec<Inequality>) -> Result<Vec<Inequality>, Flaw> {
+    match inequalities.iter().find(|inequality| inequality.smallest_pivot.is_none()) {
+        Some(failed) => Err(Flaw::Inequality { inequality: failed.name.clone() }),
+        None => Ok(inequalities),
+    }
+}
+
+/// What each kind of claim must be able to do.
+pub(crate) trait Provable {
+    /// Which kind it is.
+    fn kind(&self) -> ClaimKind;
+
+    /// What it says, in words derived from its numbers.
+    fn sentence(&self, document: &Document) -> String;
+
+    /// What the loop is taken to be (time, limits, delay, noise); empty for what claims nothing.
+    fn scope(&self, document: &Document) -> String;
+
+    /// Its figures, the most telling first.
+    fn figures(&self) -> Vec<Figure> {
+        Vec::new()
+    }
+
+    /// Checks the proof. The entry's own position lets a claim rest on earlier ones: every entry of a document is checked.
+    fn prove(&self, document: &Document, position: usize) -> Result<Vec<Inequality>, Flaw>;
+}
+
+/// Scope of the claims in continuous time.
+pub(crate) const CONTINUOUS: &str =
+    "continuous time, no torque limit, no delay, no noise, no Coulomb friction, joint limits not modelled";

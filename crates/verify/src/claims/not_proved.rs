@@ -1,0 +1,95 @@
+//! A claim that was neither proved nor refuted.
+
+use serde::{Deserialize, Serialize};
+
+use super::{ClaimKind, Inequality, Provable};
+use crate::document::Document;
+use crate::error::Flaw;
+use crate::number::Number;
+use crate::quantity::require_plain;
+
+/// A claim that was neither proved nor refuted.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NotProvedClaim {
+    /// Which claim was attempted.
+    pub of: ClaimKind,
+    /// How far the inequalities are from feasible in the solver's units; positive is infeasible.
+    pub distance: Option<Number>,
+    /// Why no proof was attempted or found.
+    pub reason: Reason,
+}
+
+/// Why there is neither a proof nor a counterexample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reason {
+    /// The proof needs the same gains on every joint.
+    UnequalGains,
+    /// The claim is about the other controller.
+    OtherController,
+    /// The proof needs a constant that is not known for this family.
+    ConstantMissing,
+    /// The proof does not cover families of this kind.
+    FamilyNotCovered,
+    /// Stable, but too slowly for the rates that are tried.
+    TooSlow,
+    /// The box is not shown stable, and no unstable point of it was found.
+    NoPointFound,
+    /// The solver found no Lyapunov function.
+    Infeasible,
+    /// What the solver found did not pass the exact check.
+    CandidateFailed,
+    /// An arm of the family was found outside the stated constants.
+    ConstantsContradicted,
+    /// A number of the problem is too large or too small to work with.
+    OutOfRange,
+}
+
+impl Reason {
+    /// In words.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Self::UnequalGains => "this claim needs the same gains on every joint",
+            Self::OtherController => "this claim is about the other controller",
+            Self::ConstantMissing => "the proof needs a constant that is not known for this family",
+            Self::FamilyNotCovered => "the proof does not cover families of this kind",
+            Self::TooSlow => "the loops of the box are stable, but at no rate of at least 0.001 per s",
+            Self::NoPointFound => "the box is not shown stable, and no unstable point of it was found",
+            Self::Infeasible => {
+                "no Lyapunov function of the claim's form was found, and no counterexample was searched"
+            }
+            Self::CandidateFailed => "the solver's candidates did not pass the exact check",
+            Self::ConstantsContradicted => {
+                "a search found an arm of the family outside the stated constants: they do not hold, and nothing is claimed"
+            }
+            Self::OutOfRange => "a number of the problem is too large or too small to be worked with",
+        }
+    }
+}
+
+impl Provable for NotProvedClaim {
+    fn kind(&self) -> ClaimKind {
+        self.of
+    }
+
+    fn sentence(&self, _: &Document) -> String {
+        let distance = self
+            .distance
+            .as_ref()
+            .map(|d| format!(" Distance to feasibility: {d} in the solver's units."))
+            .unwrap_or_default();
+        format!("Not proved ({}): {}.{distance}", self.of.name(), self.reason.in_words())
+    }
+
+    fn scope(&self, _: &Document) -> String {
+        String::new()
+    }
+
+    fn prove(&self, _: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
+        if let Some(distance) = &self.distance {
+            require_plain("distance", distance)?;
+        }
+        Ok(Vec::new())
+    }
+}
