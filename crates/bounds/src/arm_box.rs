@@ -200,6 +200,14 @@ impl<const N: usize> ArmBox<N> {
         loads.iter().map(|load| self.model_unchecked(&[&scales[..], &[*load]].concat())).collect()
     }
 
+    /// The arms whose masses are all least, and all greatest, with the least rotor inertia.
+    pub(crate) fn corner_models(&self) -> [Model<N>; 2] {
+        [0, 1].map(|end| {
+            let scales: Vec<f64> = self.groups.iter().map(|group| group.scale[end]).collect();
+            self.model_unchecked(&scales).with_rotor_inertia(&self.rotor_lower)
+        })
+    }
+
     /// Each link with half the width of its scale's interval.
     pub(crate) fn uncertain_links(&self) -> impl Iterator<Item = (&MassGroup<N>, f64)> {
         self.groups.iter().take(N).map(|group| {

@@ -46,7 +46,7 @@ mod eigen;
 mod error;
 mod maximise;
 mod quantity;
-mod riccati;
+pub mod riccati;
 pub mod rigorous;
 mod sampled;
 mod sequence;

@@ -90,9 +90,8 @@ fn point_on_axis(link: &LinkConstants, at: f64) -> Option<f64> {
     if !(is_quarter_turn(&link.rotation) && rounding == 0.0) {
         return None;
     }
-    let seen: [f64; 3] = std::array::from_fn(|i| {
-        link.rotation[0][i] * -x + link.rotation[1][i] * -y + link.rotation[2][i] * difference
-    });
+    let seen: [f64; 3] =
+        std::array::from_fn(|i| link.rotation[0][i] * -x + link.rotation[1][i] * -y + link.rotation[2][i] * difference);
     (seen[0] == 0.0 && seen[1] == 0.0).then_some(seen[2])
 }
 

@@ -114,9 +114,6 @@ impl<const N: usize> Cover<'_, N> {
                 Verdict::Positive => {}
                 Verdict::Violated => return Err(None),
                 Verdict::Open(costs) => {
-                    if std::env::var("DEBUG").is_ok() && (cell.depth.iter().any(|&d| d >= 16) || self.boxes.load(Ordering::Relaxed) % 5000 < 3) {
-                        eprintln!("{:?} {:?} costs {:?}", cell.depth, cell.index, costs);
-                    }
                     let mut across = None;
                     let mut most = 0.0;
                     for joint in 1..N {
@@ -132,7 +129,12 @@ impl<const N: usize> Cover<'_, N> {
         Ok(())
     }
 
-    #[expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of 1e12")]
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a share of 1e12"
+    )]
     fn report(&self, share: f64) {
         let part = (share * GRAIN) as u64;
         let before = self.done.fetch_add(part, Ordering::Relaxed);

@@ -68,7 +68,7 @@ pub(crate) enum Verdict<const N: usize> {
 }
 
 /// Share of the plain metric in a weight.
-static REGULAR: std::sync::LazyLock<f64> = std::sync::LazyLock::new(|| std::env::var("REG").ok().and_then(|s| s.parse().ok()).unwrap_or(0.03));
+const REGULAR: f64 = 0.02;
 
 impl<const N: usize> Form<N> {
     fn taken(&self, joint: usize) -> f64 {
@@ -189,7 +189,7 @@ fn regular(p: &Matrix, g: &Matrix, order: usize) -> Option<Matrix> {
             size += p[i][j] * g[j][i];
         }
     }
-    let share = *REGULAR * size;
+    let share = REGULAR * size;
     let mut out = ZERO;
     for i in 0..order {
         for j in 0..=i {
@@ -332,7 +332,7 @@ pub(crate) fn test<const N: usize>(chain: &Chain<N>, form: &Form<N>, arcs: &[Arc
         if i > turning {
             let negative = Ball::exact(above).negated();
             let Some((bound, _)) = below_arc(&negative, &arcs[i], &link.passage, &weights.heavy[i]) else {
-                    return open();
+                return open();
             };
             let raised = Ball::exact(bound).negated();
             above = settle(&sum(&parent.heavy, &raised.middle), parent_order, 1.0);
