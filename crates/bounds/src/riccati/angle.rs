@@ -61,9 +61,4 @@ impl Arc {
         let tau = half_sine / half_cosine + 4.0 * TRIG_ERROR;
         Some(Self { cosine, sine, tau, half_width })
     }
-
-    /// The middle alone.
-    pub fn middle(&self) -> Self {
-        Self { tau: 0.0, half_width: 0.0, ..*self }
-    }
 }

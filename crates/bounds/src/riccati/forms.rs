@@ -52,7 +52,7 @@ use super::turn::{axis, below_arc, both_sides, one_side, turned};
 pub(crate) enum Form<const N: usize> {
     /// `M - diag(D)`, kg m².
     Inertia([f64; N]),
-    /// `M -+ (∂M/∂q_joint) / 2k` with a sign of 1 or -1; the joint counts from 0 and is not the first.
+    /// `M - sign (∂M/∂q_joint) / 2k` with a sign of 1 or -1; the joint counts from 0 and is not the first.
     Coriolis { joint: usize, k: f64, sign: f64 },
 }
 
@@ -189,7 +189,7 @@ fn regular(p: &Matrix, g: &Matrix, order: usize) -> Option<Matrix> {
             size += p[i][j] * g[j][i];
         }
     }
-    let share = REGULAR * size;
+    let share = if size > 1e-200 { REGULAR * size } else { 1.0 };
     let mut out = ZERO;
     for i in 0..order {
         for j in 0..=i {

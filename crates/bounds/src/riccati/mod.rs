@@ -43,7 +43,7 @@ mod turn;
 use serde::{Deserialize, Serialize};
 
 pub use plan::RiccatiPlan;
-use plan::{Proving, intervals};
+use plan::{Ladder, Proving, intervals};
 
 use crate::arm_box::ArmBox;
 use crate::error::BoundsError;
@@ -115,7 +115,7 @@ pub fn riccati_bounds<const N: usize>(
     effort: Effort,
     progress: &(dyn Fn(f64) + Sync),
 ) -> Result<RiccatiBounds, BoundsError> {
-    Proving::new(arms, &intervals(set)?, progress).search(effort)
+    Proving::new(arms, &intervals(set)?, progress).search(Ladder::of(effort))
 }
 
 /// The bounds of a plan, proved again: the same numbers to the bit.

@@ -57,11 +57,21 @@ pub(crate) fn intervals<const N: usize>(set: &AngleSet<N>) -> Result<[[f64; 2]; 
 }
 
 /// How hard candidates are tightened: boxes for one proof, and the ratios to the sampled value that are tried in turn.
-fn ladder(effort: Effort) -> (u64, &'static [f64]) {
-    match effort {
-        Effort::Quick => (60_000, &[3.0, 1.6, 1.25]),
-        Effort::Standard => (400_000, &[3.0, 1.6, 1.25, 1.1, 1.04]),
-        Effort::Thorough => (4_000_000, &[3.0, 1.6, 1.25, 1.1, 1.05, 1.02]),
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ladder {
+    /// Boxes for one proof.
+    pub budget: u64,
+    /// From loose to tight, all above 1.
+    pub ratios: &'static [f64],
+}
+
+impl Ladder {
+    pub fn of(effort: Effort) -> Self {
+        match effort {
+            Effort::Quick => Self { budget: 40_000, ratios: &[3.0, 1.6, 1.25, 1.1, 1.03] },
+            Effort::Standard => Self { budget: 400_000, ratios: &[3.0, 1.6, 1.25, 1.1, 1.04] },
+            Effort::Thorough => Self { budget: 4_000_000, ratios: &[3.0, 1.6, 1.25, 1.1, 1.05, 1.02] },
+        }
     }
 }
 
@@ -129,12 +139,12 @@ impl<'a, const N: usize> Proving<'a, N> {
     /// The tightest candidate of the ladder that can be proved, and its proof kept.
     fn tighten(
         &mut self,
-        effort: Effort,
+        ladder: Ladder,
         from: f64,
         to: f64,
         candidate: impl Fn(f64) -> Inequality,
     ) -> Result<Inequality, BoundsError> {
-        let (budget, ratios) = ladder(effort);
+        let Ladder { budget, ratios } = ladder;
         let mut best: Option<(Inequality, Vec<CoverSize>)> = None;
         let kept = std::mem::take(&mut self.covers);
         for ratio in ratios {
@@ -154,16 +164,16 @@ impl<'a, const N: usize> Proving<'a, N> {
     }
 
     /// Candidates from a sample, tightened.
-    pub fn search(mut self, effort: Effort) -> Result<RiccatiBounds, BoundsError> {
+    pub fn search(mut self, ladder: Ladder) -> Result<RiccatiBounds, BoundsError> {
         let guesses: Vec<Guess<N>> =
             self.arms.corner_models().iter().map(|model| Guess::new(model, &self.intervals)).collect();
         let light = &guesses[0];
-        // Masses within [1 - x, 1 + x]: see the module's remark on uncertain masses.
+        // Least masses against greatest: what cancels between them for one arm does not for a range, of which the second term is a guess.
         let spread = self.arms.groups().iter().take(N).map(|group| group.scale[1] / group.scale[0]).fold(1.0, f64::max);
         let mut k = [0.0; N];
         for guess in &guesses {
             for joint in 1..N {
-                k[joint] = f64::max(k[joint], guess.k[joint] * spread.sqrt());
+                k[joint] = f64::max(k[joint], (guess.k[joint].powi(2) * spread + 0.3 * (spread - 1.0)).sqrt());
             }
         }
         #[expect(clippy::cast_precision_loss, reason = "a handful of joints")]
@@ -174,12 +184,12 @@ impl<'a, const N: usize> Proving<'a, N> {
             (done - step, done)
         };
         let (from, to) = next();
-        let m_lo = self.tighten(effort, from, to, |ratio| Inequality::Inertia {
+        let m_lo = self.tighten(ladder, from, to, |ratio| Inequality::Inertia {
             kg_m2: vec![plain(light.m_lo / ratio, false); N],
         })?;
         let (from, to) = next();
         let shape = light.diagonal(None);
-        let diagonal = self.tighten(effort, from, to, |ratio| Inequality::Inertia {
+        let diagonal = self.tighten(ladder, from, to, |ratio| Inequality::Inertia {
             kg_m2: shape.iter().map(|x| plain(x / ratio, false)).collect(),
         })?;
         let mut k_joint = vec![0.0; N];
@@ -189,7 +199,7 @@ impl<'a, const N: usize> Proving<'a, N> {
             let floor = 0.02 * k.iter().copied().fold(0.0, f64::max);
             let guess = k[joint].max(floor);
             if k[joint] > 1e-9 {
-                let found = self.tighten(effort, from, to, |ratio| Inequality::Coriolis {
+                let found = self.tighten(ladder, from, to, |ratio| Inequality::Coriolis {
                     joint: joint + 1,
                     k: plain(guess * ratio, true),
                 })?;
@@ -198,7 +208,7 @@ impl<'a, const N: usize> Proving<'a, N> {
                 }
             } else {
                 let zero = Inequality::Coriolis { joint: joint + 1, k: 1e-6 };
-                let budget = ladder(effort).0;
+                let budget = ladder.budget;
                 self.prove(&zero, budget, from, to).ok_or_else(|| not_proved(&zero, budget))?;
                 k_joint[joint] = 1e-6;
             }
@@ -208,7 +218,7 @@ impl<'a, const N: usize> Proving<'a, N> {
         proved_k.copy_from_slice(&k_joint);
         let shape = light.diagonal(Some(&proved_k));
         let metric = if N > 1 {
-            self.tighten(effort, from, to, |ratio| Inequality::Inertia {
+            self.tighten(ladder, from, to, |ratio| Inequality::Inertia {
                 kg_m2: shape.iter().map(|x| plain(x / ratio, false)).collect(),
             })?
         } else {
@@ -219,7 +229,7 @@ impl<'a, const N: usize> Proving<'a, N> {
             diagonal_lower_kg_m2: all(&diagonal),
             k_joint,
             metric_kg_m2: all(&metric),
-            budget: ladder(effort).0,
+            budget: ladder.budget,
         };
         Ok(self.finish(plan))
     }

@@ -250,15 +250,21 @@ pub(crate) fn below_arc(b: &Ball, arc: &Arc, passage: &Passage, weight: &Matrix)
             }
         }
     }
-    for slack in [1e-10, 1e-7] {
+    let size = largest(&controls[2].middle);
+    #[expect(clippy::cast_precision_loss, reason = "n <= 6")]
+    let order = n as f64;
+    // What the check below must subtract itself, and as much again.
+    let blur = controls.iter().fold(0.0_f64, |most, control| most.max(control.radius));
+    let blur = 2.0 * order * (blur + 16.0 * ROUNDING * size);
+    // Slack for the roundings of the guess, in the weight's metric and absolutely; more where the weight is ill conditioned.
+    for slack in [1e-12, 1e-10, 1e-8, 1e-6] {
         let mut trial = guess;
         for (i, row) in trial.iter_mut().enumerate().take(n) {
             row[i] -= slack * scale;
         }
-        let mut bound = sandwich(&trial, &inverse, n, true);
-        let size = largest(&controls[2].middle);
+        let mut bound = if arc.half_width > 0.0 { sandwich(&trial, &inverse, n, true) } else { controls[2].middle };
         for i in 0..n {
-            bound[i][i] -= 1e-12 * size;
+            bound[i][i] -= slack * size + blur;
             for j in 0..i {
                 bound[j][i] = bound[i][j];
             }
