@@ -150,6 +150,11 @@ impl<const N: usize> ArmBox<N> {
         &self.groups
     }
 
+    /// The nominal arm, without payload of the box, rotor inertia and friction.
+    pub(crate) fn base(&self) -> &Model<N> {
+        &self.base
+    }
+
     /// Lower and upper rotor inertia of every joint, kg m².
     #[must_use]
     pub fn rotor_inertia_kg_m2(&self) -> [Joints<N>; 2] {
@@ -193,6 +198,14 @@ impl<const N: usize> ArmBox<N> {
         scales.truncate(N);
         let loads = if payload[0] < payload[1] { &payload[..] } else { &payload[..1] };
         loads.iter().map(|load| self.model_unchecked(&[&scales[..], &[*load]].concat())).collect()
+    }
+
+    /// The arms whose masses are all least, and all greatest, with the least rotor inertia.
+    pub(crate) fn corner_models(&self) -> [Model<N>; 2] {
+        [0, 1].map(|end| {
+            let scales: Vec<f64> = self.groups.iter().map(|group| group.scale[end]).collect();
+            self.model_unchecked(&scales).with_rotor_inertia(&self.rotor_lower)
+        })
     }
 
     /// Each link with half the width of its scale's interval.

@@ -71,7 +71,9 @@ pub enum BoundsError {
         link: usize,
     },
     /// An interval of angles that is not ordered, or beyond what the enclosures of sine and cosine are made for.
-    #[error("angles of joint {joint} are {lower} to {upper} rad, expected lower <= upper, both within +-15 or a full turn")]
+    #[error(
+        "angles of joint {joint} are {lower} to {upper} rad, expected lower <= upper, both within +-15 or a full turn"
+    )]
     Angles {
         /// Joint, counted from 1 at the base.
         joint: usize,
@@ -99,6 +101,16 @@ pub enum BoundsError {
     Enclosure {
         /// Its width.
         width: f64,
+    },
+    /// A bound that could not be proved with the boxes allowed, or is false.
+    #[error("joint {joint} (0: the inertia): bound {claim} not proved within {boxes} boxes of angles")]
+    NotProved {
+        /// Joint whose Coriolis constant it is, counted from 1 at the base; 0 for a bound of the inertia.
+        joint: usize,
+        /// The bound tried.
+        claim: f64,
+        /// Boxes allowed.
+        boxes: u64,
     },
     /// An axis of a search that is not a finite, ordered interval.
     #[error("search axis {axis} is {lower} to {upper}, expected lower <= upper, both finite")]

@@ -194,7 +194,8 @@ pub(crate) fn composite<T: Scalar>(own: &Sym4<T>, b: &Step<T>, child: &Sym4<T>) 
     let mut sum = *own;
     for r in 0..3 {
         for c in r..3 {
-            let term = product[r][0] * b[c][0] + product[r][1] * b[c][1] + product[r][2] * b[c][2] + product[r][3] * b[c][3];
+            let term =
+                product[r][0] * b[c][0] + product[r][1] * b[c][1] + product[r][2] * b[c][2] + product[r][3] * b[c][3];
             sum[r][c] = own[r][c] + term;
             sum[c][r] = sum[r][c];
         }

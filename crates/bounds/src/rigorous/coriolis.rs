@@ -63,11 +63,7 @@ struct Body<T> {
 impl<T: Scalar> Body<T> {
     fn rotate(&self, w: &Vec3<T>) -> Vec3<T> {
         let [xx, yy, zz, xy, xz, yz] = self.inertia;
-        [
-            xx * w[0] + xy * w[1] + xz * w[2],
-            xy * w[0] + yy * w[1] + yz * w[2],
-            xz * w[0] + yz * w[1] + zz * w[2],
-        ]
+        [xx * w[0] + xy * w[1] + xz * w[2], xy * w[0] + yy * w[1] + yz * w[2], xz * w[0] + yz * w[1] + zz * w[2]]
     }
 
     /// Momentum of a velocity.
@@ -75,11 +71,7 @@ impl<T: Scalar> Body<T> {
         let line = cross(&s.turn, &self.moment);
         Screw {
             turn: sum(&self.rotate(&s.turn), &cross(&self.moment, &s.line)),
-            line: [
-                self.mass * s.line[0] + line[0],
-                self.mass * s.line[1] + line[1],
-                self.mass * s.line[2] + line[2],
-            ],
+            line: [self.mass * s.line[0] + line[0], self.mass * s.line[1] + line[1], self.mass * s.line[2] + line[2]],
         }
     }
 
@@ -116,11 +108,7 @@ impl<T: Scalar> Body<T> {
                 turned(0, 2) + moved[4],
                 turned(1, 2) + moved[5],
             ],
-            moment: [
-                self.mass * s.line[0] + line[0],
-                self.mass * s.line[1] + line[1],
-                self.mass * s.line[2] + line[2],
-            ],
+            moment: [self.mass * s.line[0] + line[0], self.mass * s.line[1] + line[1], self.mass * s.line[2] + line[2]],
             mass: T::zero(),
         }
     }
@@ -128,7 +116,8 @@ impl<T: Scalar> Body<T> {
 
 /// The body of a link, seen in the frame that `t` leads to.
 fn seen<T: Scalar>(inertia: &Mat3<T>, moment: &Vec3<T>, mass: T, t: &Step<T>) -> Body<T> {
-    let rotated = |v: &Vec3<T>| -> Vec3<T> { std::array::from_fn(|r| t[r][0] * v[0] + t[r][1] * v[1] + t[r][2] * v[2]) };
+    let rotated =
+        |v: &Vec3<T>| -> Vec3<T> { std::array::from_fn(|r| t[r][0] * v[0] + t[r][1] * v[1] + t[r][2] * v[2]) };
     let half: Mat3<T> = std::array::from_fn(|k| rotated(&inertia[k]));
     let entry = |i: usize, k: usize| t[i][0] * half[0][k] + t[i][1] * half[1][k] + t[i][2] * half[2][k];
     let origin = [t[0][3], t[1][3], t[2][3]];
@@ -166,10 +155,7 @@ impl<T: Scalar> Base<T> {
     /// The axis and its moment before the turn of joint 1.
     fn new<const N: usize>(chain: &Chain<N, T>) -> Self {
         let (r, p) = (&chain.rotation[1], &chain.position[1]);
-        Self {
-            turn: r[2],
-            line: std::array::from_fn(|k| r[1][k] * p[0] - r[0][k] * p[1]),
-        }
+        Self { turn: r[2], line: std::array::from_fn(|k| r[1][k] * p[0] - r[0][k] * p[1]) }
     }
 
     /// Constant, cosine and sine coefficient of `S_0 . f`.

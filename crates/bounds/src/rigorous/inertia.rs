@@ -50,8 +50,7 @@ struct Inner<T> {
 }
 
 /// Entries of a symmetric 4x4 matrix in the order of [`Inner::zeta`].
-const UPPER: [(usize, usize); 10] =
-    [(0, 0), (1, 1), (2, 2), (3, 3), (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+const UPPER: [(usize, usize); 10] = [(0, 0), (1, 1), (2, 2), (3, 3), (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
 
 #[inline]
 fn outer<const N: usize, T: Scalar>(steps: &[Step<T>; N], composites: &[Sym4<T>; N]) -> Outer<N, T> {
@@ -82,14 +81,8 @@ fn outer<const N: usize, T: Scalar>(steps: &[Step<T>; N], composites: &[Sym4<T>;
             let (t, w) = (&frame[i], &weighted[r]);
             t[0] * w[0] + t[1] * w[1] + t[2] * w[2] + t[3] * w[3]
         };
-        out.wrench[b] = [
-            z(1, 2) - z(2, 1),
-            z(2, 0) - z(0, 2),
-            z(0, 1) - z(1, 0),
-            weighted[0][3],
-            weighted[1][3],
-            weighted[2][3],
-        ];
+        out.wrench[b] =
+            [z(1, 2) - z(2, 1), z(2, 0) - z(0, 2), z(0, 1) - z(1, 0), weighted[0][3], weighted[1][3], weighted[2][3]];
     }
     out
 }
