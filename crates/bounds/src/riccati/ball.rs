@@ -66,7 +66,7 @@ impl Ball {
         product(y, &half, columns, rows, columns, true)
     }
 
-    /// The same with every entry outside the leading block of the given order set to zero.
+    /// The negative.
     pub fn negated(&self) -> Self {
         Self { middle: self.middle.map(|row| row.map(|x| -x)), radius: self.radius }
     }

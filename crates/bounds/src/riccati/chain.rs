@@ -1,8 +1,13 @@
 //! The arm as the recursion sees it: passages from link to link, and the inertia of each link at both ends of its mass.
 //!
-//! The arm meant is the one whose numbers are those of the `Model`, taken as exact: its kinetic energy is
-//! `½ sum_i V_i' I_i V_i + ½ sum_i r_i v_i²` with `V_i = Z(q_i) X_i V_{i-1} + z v_i`, `X (w, u) = (R' w, R'(u + w x p))`. Nothing below needs R to
-//! be exactly orthogonal.
+//! The kinetic energy is `½ sum_i V_i' I_i V_i + ½ sum_i r_i v_i²` with `V_i = Z(q_i) X_i V_{i-1} + z v_i`, `X (w, u) = (R' w, R'(u + w x p))`.
+//! Nothing below needs R to be exactly orthogonal.
+//!
+//! **Which arm is meant.** The numbers of a `Model` are roundings of what somebody meant. The bounds hold for every arm whose frames are
+//! rotations and whose numbers are off by at most: masses and positions 2^-48 of their own size; first moments `2^-48 sqrt(m tr I)`;
+//! inertias `2^-48 tr I`; rotation entries 2^-48 plus three times the largest entry of `R'R - 1`, and nothing where R holds only
+//! 0 and ±1. Each inertia carries an error of [`DATA`] times its largest entry, which is more than that (`tr I <= 3 max`, `sqrt(m tr I) <= 2 max`)
+//! plus the rounding of its scale.
 //!
 //! **Reachable velocities.** The first link only turns about its axis. If the first joints' axes meet in one point (a shoulder), the
 //! links up to the last of them only turn about that point, and three coordinates suffice: `V = (w, w x (0, 0, -c))` for a point at
@@ -14,6 +19,9 @@ use certune_dynamics::LinkConstants;
 use super::ball::{Ball, Matrix, ROUNDING, ZERO, largest};
 use super::turn::Passage;
 use crate::arm_box::ArmBox;
+
+/// Relative error of an inertia or a position: 2^-46, four times what a number of the arm may carry.
+const DATA: f64 = 1.0 / (1_u64 << 46) as f64;
 
 /// One link of the chain.
 #[derive(Clone, Copy, Debug)]
@@ -50,9 +58,9 @@ fn inertia(link: &LinkConstants, scale: f64) -> Matrix {
     rows.map(|row| row.map(|value| value * scale))
 }
 
-/// The sum of two inertias that each carry one rounding.
+/// The sum of two inertias that each carry the error of their data.
 fn plus(a: &Matrix, b: &Matrix) -> Ball {
-    let one = |m: &Matrix| Ball { middle: *m, radius: ROUNDING * largest(m) };
+    let one = |m: &Matrix| Ball { middle: *m, radius: DATA * largest(m) };
     Ball::combination([(1.0, 0.0, &one(a)), (1.0, 0.0, &one(b))])
 }
 
@@ -71,7 +79,19 @@ fn motion(link: &LinkConstants) -> Ball {
         }
     }
     let size = x.abs().max(y.abs()).max(z.abs());
-    Ball { middle, radius: 4.0 * ROUNDING * size }
+    let turn = if is_quarter_turn(r) {
+        0.0
+    } else {
+        let mut off = 0.0_f64;
+        for i in 0..3 {
+            for j in 0..3 {
+                let product: f64 = (0..3).map(|k| r[k][i] * r[k][j]).sum();
+                off = off.max((product - f64::from(u8::from(i == j))).abs());
+            }
+        }
+        DATA + 4.0 * off
+    };
+    Ball { middle, radius: (turn * (1.0 + 3.0 * size) + 3.0 * DATA * size) * 1.000_001 }
 }
 
 /// True if every entry is 0, 1 or -1.
@@ -80,14 +100,18 @@ fn is_quarter_turn(rotation: &[[f64; 3]; 3]) -> bool {
     rotation.iter().flatten().all(|&x| x == 0.0 || x.abs() == 1.0)
 }
 
-/// Where the point `(0, 0, at)` of the parent lies on this link's axis, if it does so exactly.
-fn point_on_axis(link: &LinkConstants, at: f64) -> Option<f64> {
+/// Where the point `(0, 0, at)` of the parent lies on this link's axis, if it does so exactly and whatever the data's errors.
+///
+/// A zero stays a zero under a relative error, but the difference of two equal heights does not, unless one is `defined` as the other.
+fn point_on_axis(link: &LinkConstants, at: f64, defined: bool) -> Option<f64> {
     let [x, y, z] = link.position_m;
     // Knuth's two-sum: `rounding` is exactly what the subtraction lost.
     let difference = at - z;
     let back = difference - at;
     let rounding = (at - (difference - back)) + (-z - back);
-    if !(is_quarter_turn(&link.rotation) && rounding == 0.0) {
+    let along = link.rotation[2][0] == 0.0 && link.rotation[2][1] == 0.0;
+    let sure = defined || along || (at == 0.0 && z == 0.0);
+    if !(is_quarter_turn(&link.rotation) && rounding == 0.0 && sure) {
         return None;
     }
     let seen: [f64; 3] =
@@ -104,7 +128,7 @@ fn about(at: f64) -> Ball {
     // w x (0, 0, -at) = (-at w_y, at w_x, 0).
     middle[3][1] = -at;
     middle[4][0] = at;
-    Ball::exact(middle)
+    Ball { middle, radius: 3.0 * DATA * at.abs() }
 }
 
 /// `a b` with the error of one product of order 6.
@@ -159,9 +183,9 @@ impl<const N: usize> Chain<N> {
             let (expand, here) = if i == 1 {
                 seed[2][0] = 1.0;
                 // Any point of the first axis may be the fixed one; that at the second joint's height is tried.
-                (Ball::exact(seed), point_on_axis(link, link.position_m[2]))
+                (Ball::exact(seed), point_on_axis(link, link.position_m[2], true))
             } else {
-                (fixed.map_or_else(identity, about), fixed.and_then(|at| point_on_axis(link, at)))
+                (fixed.map_or_else(identity, about), fixed.and_then(|at| point_on_axis(link, at, false)))
             };
             let y = times(&x, &expand);
             let order = if here.is_some() { 3 } else { 6 };

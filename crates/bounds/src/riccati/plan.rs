@@ -83,6 +83,7 @@ fn plain(x: f64, up: bool) -> f64 {
     let text = format!("{x:.3e}");
     let mut rounded: f64 = text.parse().unwrap_or(x);
     if (up && rounded < x) || (!up && rounded > x) {
+        #[expect(clippy::cast_possible_truncation, reason = "within +-300")]
         let digit = 10_f64.powi(x.log10().floor().clamp(-300.0, 300.0) as i32 - 3);
         rounded += if up { digit } else { -digit };
         rounded = format!("{rounded:.3e}").parse().unwrap_or(rounded);

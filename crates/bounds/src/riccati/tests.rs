@@ -415,7 +415,7 @@ fn bounds_of_the_panda_over_the_task_hold_are_tight_and_are_found_again() {
     assert_eq!(found, again);
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert_eq!(alone.install(|| bounds(&arms, &task_box())), found);
-    let approach = hunt(&arms, &task_box(), &found, 20_000, 100);
+    let approach = hunt(&arms, &task_box(), &found, 12_000, 100);
     println!("closest approaches: {approach:.3?}");
     // Within the plan's own tightness, or the search is not a search.
     assert!(approach[0] > 0.75 && approach[2] > 0.75, "{approach:?}");
@@ -434,7 +434,7 @@ fn bounds_hold_for_uncertain_masses_a_payload_and_rotor_inertia() {
     };
     let arms = panda(&ranges);
     let found = bounds(&arms, &task_box());
-    let approach = hunt(&arms, &task_box(), &found, 20_000, 60);
+    let approach = hunt(&arms, &task_box(), &found, 10_000, 60);
     println!("closest approaches: {approach:.3?}");
 }
 
