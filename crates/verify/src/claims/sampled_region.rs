@@ -20,11 +20,12 @@ use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 use serde::{Deserialize, Serialize};
 
-use super::sampled_motion::{Corner, SampledLoop, SampledUnknowns};
+use super::sampled_motion::{Corner, Reach, SampledLoop, SampledUnknowns};
 use super::{ClaimKind, Figure, Inequality, Provable, all_hold};
 use crate::algebra::{Matrix, zeros};
 use crate::document::{ConfigurationSet, Document};
 use crate::error::Flaw;
+use crate::normed::{Norm, Normed};
 use crate::number::{Number, positive, unit_interval};
 use crate::quantity::{require, require_length, require_positive};
 
@@ -161,6 +162,31 @@ impl Provable for SampledRegionClaim {
 
     fn prove(&self, document: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
         all_hold(sampled_region_inequalities(document, self)?)
+    }
+}
+
+impl Normed for SampledRegionClaim {
+    fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
+        Ok(Norm {
+            shift_weights: vec![self.goal_step_weight()?; document.arm.joints],
+            rate: self.sampling.rate_per_s.value().clone(),
+            period: Some(self.sampling.step_s.value().clone()),
+            kept: None,
+        })
+    }
+
+    fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
+        let motion = sampled_loop(document, &self.sampling, &self.witness.rho, &self.witness.speed)?;
+        let unknowns = unknowns(&self.witness, self.sampling.delay_samples)?;
+        let error = motion.coordinates(Reach::Sample).error;
+        let closeness = (most * most).recip();
+        // With the multipliers of `growth`, whose other terms are not negative.
+        let at = |(index, corner): (usize, &Corner<BigRational>)| {
+            let mut form = motion.growth(&unknowns, corner).0;
+            form[error][error] -= &closeness;
+            Inequality::decide(format!("distance at corner {} of the inertia interval", index + 1), &form)
+        };
+        Ok(corners(document, &self.witness)?.iter().enumerate().map(at).collect())
     }
 }
 
