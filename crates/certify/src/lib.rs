@@ -15,6 +15,7 @@
 //! | `moving_goal` | the fastest goal that a region allows |
 //! | `sampled_region` | the same of the sampled nonlinear loop |
 //! | `adaptive` | convergence, the frozen loop and the sampled velocity loop of the adaptive controller |
+//! | `lyapunov` | Lyapunov matrices of any linear loop or polytope of loops |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
@@ -26,6 +27,7 @@ mod disturbance;
 mod exponential;
 mod joint_region;
 mod lmi;
+mod lyapunov;
 mod moving_goal;
 mod problem;
 mod region;
@@ -36,6 +38,7 @@ pub use disturbance::{DisturbanceOptions, disturbance};
 pub use exponential::{UnstableLoop, exponential};
 pub use joint_region::{JointRegionOptions, joint_region};
 pub use lmi::{Affine, Program, Solution, SolveError};
+pub use lyapunov::{LinearFamily, LyapunovFailure, LyapunovMatrix, fastest_decay, lyapunov};
 pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal, moving_goal_on};
 pub use problem::{
     AicGainValues, ArmValues, ConstantValues, EnclosureValues, FamilyValues, MracGainValues, Problem, ProblemError,

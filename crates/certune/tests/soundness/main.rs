@@ -15,6 +15,7 @@ mod attacks;
 mod chance;
 mod continuous;
 mod held;
+mod limits;
 mod members;
 mod moving;
 mod subjects;
