@@ -164,7 +164,7 @@ pub struct CertifyArgs {
     /// Configurations that the claims speak of [default: torus]
     #[arg(long, value_name = "torus|range|scenario", hide_possible_values = true)]
     pub over: Option<OverName>,
-    /// The goal of the claims about one configuration, rad, separated by commas [default: the scenario's first goal]
+    /// Configuration of the claims about one (lyapunov, and all about MRAC), rad, separated by commas [default: the scenario's first goal]
     #[arg(long, value_name = "LIST", value_parser = numbers, allow_hyphen_values = true)]
     pub at: Option<Numbers>,
     /// Claim it for every plant of this scenario's plant box, instead of the five options below

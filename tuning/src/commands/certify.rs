@@ -135,17 +135,16 @@ fn released_code(gains: &GainsSource) -> Option<&'static str> {
     }
 }
 
-/// The goal of claims about one configuration; only an adaptive controller has such claims.
-fn at<const N: usize>(args: &CertifyArgs, robot: &Robot, gains: &ArmGains<N>) -> Result<Option<Vec<f64>>, Error> {
-    match (&args.at, gains) {
-        (Some(Numbers(found)), _) if found.len() != N => {
+/// The configuration of claims about one.
+fn at<const N: usize>(args: &CertifyArgs, robot: &Robot) -> Result<Vec<f64>, Error> {
+    match &args.at {
+        Some(Numbers(found)) if found.len() != N => {
             Err(Error::ListLength { flag: "--at", found: found.len(), robot: robot.name().to_owned(), joints: N })
         }
-        (Some(Numbers(at)), _) => Ok(Some(at.clone())),
-        (None, ArmGains::Aic(_)) => Ok(None),
-        (None, ArmGains::Mrac(_)) => {
+        Some(Numbers(at)) => Ok(at.clone()),
+        None => {
             let scenario = catalogue::scenario(args.scenario.as_deref(), robot)?;
-            Ok(scenario.segments.first().map(|segment| segment.goal_rad.clone()))
+            Ok(scenario.segments.first().map_or(scenario.start_rad, |segment| segment.goal_rad.clone()))
         }
     }
 }
@@ -193,9 +192,9 @@ fn certificate<const N: usize>(
     };
     let request = Request {
         claims: args.claims.clone(),
-        delay_samples: args.delay.unwrap_or(plant_box.delay_samples[1]),
+        delay_samples: args.delay,
         torque_limits: args.torque_limits.unwrap_or_default(),
-        at_rad: at(args, robot, &gains)?,
+        at_rad: Some(at::<N>(args, robot)?),
         goals: args
             .scenario
             .is_some()

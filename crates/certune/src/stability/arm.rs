@@ -13,7 +13,7 @@ use crate::adaptive::AdaptiveSetting;
 use super::constants::{Over, best_record, sampled_diagonals, sampled_values};
 use super::gains::ArmGains;
 use super::request::{Answer, Effort, Request, TorqueLimits, claims_for};
-use super::{STEP_S, StabilityError};
+use super::{STEP_S, StabilityError, checked};
 
 /// An arm with a family of plants, ready to certify any number of gains.
 ///
@@ -138,7 +138,13 @@ impl<const N: usize> ArmCertifier<N> {
     /// # Errors
     /// As [`ArmCertifier::certify`].
     pub fn answer(&self, gains: &ArmGains<N>, request: &Request) -> Result<Answer, StabilityError> {
-        let claims = if request.claims.is_empty() { claims_for(gains) } else { request.claims.clone() };
+        let goal = request.at_rad.as_deref().and_then(|at| <[f64; N]>::try_from(at).ok());
+        let all = || {
+            let needs_goal = |kind: &ClaimKind| *kind == ClaimKind::Lyapunov && goal.is_none();
+            claims_for(gains).into_iter().filter(|kind| !needs_goal(kind)).collect()
+        };
+        let claims: Vec<ClaimKind> = if request.claims.is_empty() { all() } else { request.claims.clone() };
+        let at_goal = || goal.ok_or(StabilityError::NoConfiguration { joints: N });
         match gains {
             ArmGains::Aic(aic) => {
                 AicParams::new(aic, STEP_S)?;
@@ -147,15 +153,20 @@ impl<const N: usize> ArmCertifier<N> {
                 let attain = |timing: Option<&LoopTiming>| {
                     self.unstable_member(aic, timing, &request.effort.counterexample).ok().flatten()
                 };
-                let certificate = certify(&problem, &claims, &options, &attain)?;
+                // A claim that knows the arm stands behind those that know only its constants.
+                let (at_one, over_all): (Vec<_>, Vec<_>) =
+                    claims.into_iter().partition(|kind| *kind == ClaimKind::Lyapunov);
+                let document = match over_all.as_slice() {
+                    [] => problem.document().clone(),
+                    kinds => certify(&problem, kinds, &options, &attain)?.document().clone(),
+                };
+                let extra = at_one.iter().map(|_| self.lyapunov_at(aic, at_goal()?)).collect::<Result<_, _>>()?;
+                let certificate = checked(document, extra, problem.records())?;
                 Ok(Answer { certificate, records: problem.records().to_vec() })
             }
             ArmGains::Mrac(mrac) => {
-                let goal = request.at_rad.as_deref().and_then(|at| <[f64; N]>::try_from(at).ok());
-                let setting = AdaptiveSetting {
-                    delay_samples: u32::try_from(request.delay_samples).unwrap_or(u32::MAX),
-                    ..AdaptiveSetting::around(goal.ok_or(StabilityError::NoConfiguration { joints: N })?)
-                };
+                let delay_samples = u32::try_from(request.delay_samples.unwrap_or(0)).unwrap_or(u32::MAX);
+                let setting = AdaptiveSetting { delay_samples, ..AdaptiveSetting::around(at_goal()?) };
                 self.answer_adaptive(mrac, &setting, &claims)
             }
         }
@@ -165,7 +176,7 @@ impl<const N: usize> ArmCertifier<N> {
     fn options(&self, request: &Request) -> Result<Options, StabilityError> {
         let mut options = request.effort.proofs.clone();
         options.sampled_region.step_s = STEP_S;
-        options.sampled_region.delay_samples = request.delay_samples;
+        options.sampled_region.delay_samples = request.delay_samples.unwrap_or(0);
         match request.torque_limits {
             TorqueLimits::None => {}
             TorqueLimits::Norm(limit) => {
@@ -179,7 +190,10 @@ impl<const N: usize> ArmCertifier<N> {
                 options.region.motor_limits_n_m = Some(limits);
             }
         }
+        // With a delay in the question the goal moves on the region of the sampled loop.
+        options.moving_goal.sampled_region = request.delay_samples.map(|_| options.sampled_region);
         options.moving_goal.region = options.region.clone();
+        options.moving_goal.joint_region = options.joint_region.clone();
         options.moving_goal.list.clone_from(&request.goals);
         options.joint_region.steps_rad = request.goals.as_ref().map(steps_rad).unwrap_or_default();
         Ok(options)
