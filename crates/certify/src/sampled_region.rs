@@ -213,7 +213,7 @@ impl Candidate {
             }
         }
         let mut multiplier = |used: bool, unit: f64| if used { next(true) * unit } else { 0.0 };
-        let mean = motion.remainder().recip();
+        let mean = motion.mean_bounds()[0][0].recip();
         let span = motion.friction()[1].max(1e-3).powi(-2);
         let mut four = || {
             [
@@ -274,7 +274,7 @@ impl Candidate {
             if let Some(friction) = friction {
                 row -= change.row(friction) * (sign * lead);
             }
-            row[mean] += motion.remainder().sqrt() / root;
+            row[mean] += motion.mean_bounds()[0][0].sqrt() / root;
             change.set_row(mean, &(row * scale));
         }
         change

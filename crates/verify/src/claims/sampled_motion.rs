@@ -51,7 +51,7 @@ impl Corner<BigRational> {
 
 /// A bound `kinetic |dq|_M^2 + torque h^2 |tau|_M^-1^2`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bound<T> {
+struct Bound<T> {
     kinetic: T,
     torque: T,
 }
@@ -308,9 +308,10 @@ impl<T: Field> SampledLoop<T> {
         self.coriolis_relative.is_some()
     }
 
-    /// Square of `alpha` in the bound on the mean velocity.
-    pub fn remainder(&self) -> &T {
-        &self.ahead.kinetic
+    /// Weights of `|dq|_M^2` and `h^2 |tau|_M^-1^2` in the bound on the mean velocity's remainder: of the period that starts, and of the
+    /// one that ended.
+    pub fn mean_bounds(&self) -> [[&T; 2]; 2] {
+        [&self.ahead, &self.behind].map(|bound| [&bound.kinetic, &bound.torque])
     }
 
     /// The controller's period, s.
