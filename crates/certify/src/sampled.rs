@@ -107,7 +107,7 @@ pub fn sampled(problem: &Problem, options: &SampledOptions, attain: &Attain<'_>)
         return not_proved(Reason::OutOfRange, Vec::new());
     };
     let margins = margins(document, exact_hold, &stable);
-    Claim::Sampled(SampledClaim { sampling, rate_per_s, delay_margin_s, margins })
+    Claim::Sampled(Box::new(SampledClaim { sampling, rate_per_s, delay_margin_s, margins }))
 }
 
 /// So many periods, as a decimal.

@@ -10,7 +10,7 @@
 //! | `number` | decimals and dyadics as written, and the rational numbers they are |
 //! | `quantity` | what a number must be before anything is derived from it |
 //! | `outward` | square roots and exponentials rounded to the safe side |
-//! | `algebra` | characteristic polynomial, Hurwitz determinants, Sturm sequences, LDL' |
+//! | `algebra` | characteristic polynomial, Hurwitz determinants, LDL' |
 //! | `polytope` | whether every polynomial of a box of them is stable |
 //! | `sampled_loops` | the polynomials of the loops with a sampled controller and a delayed torque |
 //! | `form` | quadratic forms assembled from linear ones |

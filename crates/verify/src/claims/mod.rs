@@ -56,7 +56,7 @@ pub enum Claim {
     /// Every linearised loop of the family decays at a rate.
     Exponential(ExponentialClaim),
     /// Every linearised loop of the family decays when the controller is sampled and delayed.
-    Sampled(SampledClaim),
+    Sampled(Box<SampledClaim>),
     /// The nonlinear loop decays from every start in a ball.
     Region(Box<RegionClaim>),
     /// The adaptive loop's error converges.
@@ -93,7 +93,7 @@ impl Claim {
     pub(crate) fn provable(&self) -> &dyn Provable {
         match self {
             Self::Exponential(claim) => claim,
-            Self::Sampled(claim) => claim,
+            Self::Sampled(claim) => claim.as_ref(),
             Self::Region(claim) => claim.as_ref(),
             Self::AdaptiveConvergence(claim) => claim.as_ref(),
             Self::AdaptiveRefused(claim) => claim.as_ref(),
