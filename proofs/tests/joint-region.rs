@@ -92,7 +92,7 @@ fn derived(friction: [f64; 2]) -> Certificate {
         ..JointRegionOptions::default()
     };
     let options = Options { joint_region, ..Options::default() };
-    certify(&problem(friction), &[ClaimKind::JointRegion], &options, &|| None).unwrap()
+    certify(&problem(friction), &[ClaimKind::JointRegion], &options, &|_| None).unwrap()
 }
 
 fn covered_share(certificate: &Certificate) -> f64 {

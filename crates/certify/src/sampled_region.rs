@@ -317,15 +317,7 @@ impl Candidate {
             }
         }
         blocks.push(Box::new(|x| DMatrix::from_element(1, 1, self.unknowns(x).theta)));
-        let t0 = std::time::Instant::now();
-        let r = Program { cost, nonnegative, blocks }.solve();
-        println!(
-            "{:?} {strictness} {:?} {:?}",
-            self.bounds,
-            t0.elapsed(),
-            r.as_ref().map(|s| (s.accurate, self.unknowns(&s.x).s[0][0]))
-        );
-        let x = r.ok()?.x;
+        let x = Program { cost, nonnegative, blocks }.solve().ok()?.x;
         let found = Found { x: self.unknowns(&x), bounds: self.bounds, points: self.points.clone() };
         (found.start() > 0.0).then_some(found)
     }

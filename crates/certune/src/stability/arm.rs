@@ -6,7 +6,7 @@ use certune_bounds::{ArmBox, BoundsError, Ranges, SampledConstants, SamplingOpti
 use certune_certify::{ArmValues, ConstantValues, FamilyValues, GoalListValues, Options, Problem, arm_ranges, certify};
 use certune_control::aic::{AicGains, AicParams};
 use certune_dynamics::{Model, Payload, Robot};
-use certune_verify::{Arm, Certificate, ClaimKind, Gains, Number, Record};
+use certune_verify::{Arm, Certificate, ClaimKind, Gains, LoopTiming, Number, Record};
 
 use crate::adaptive::AdaptiveSetting;
 
@@ -141,10 +141,12 @@ impl<const N: usize> ArmCertifier<N> {
         let claims = if request.claims.is_empty() { claims_for(gains) } else { request.claims.clone() };
         match gains {
             ArmGains::Aic(aic) => {
-                let params = AicParams::new(aic, STEP_S)?;
+                AicParams::new(aic, STEP_S)?;
                 let problem = self.problem(gains.written()?)?;
                 let options = self.options(request)?;
-                let attain = || self.unstable_member(&params, &request.effort.counterexample).ok().flatten();
+                let attain = |timing: Option<&LoopTiming>| {
+                    self.unstable_member(aic, timing, &request.effort.counterexample).ok().flatten()
+                };
                 let certificate = certify(&problem, &claims, &options, &attain)?;
                 Ok(Answer { certificate, records: problem.records().to_vec() })
             }

@@ -306,7 +306,7 @@ impl Region {
 }
 
 fn attack(kind: ClaimKind, gains: &AicGains<N>, options: &Options, seed: u64) {
-    let certificate = certify(&problem(gains, true), &[kind], options, &|| None).unwrap();
+    let certificate = certify(&problem(gains, true), &[kind], options, &|_| None).unwrap();
     assert!(certificate.all_hold(), "{}", certificate.checked()[0].statement);
     let claim = &certificate.document().claims[0].claim;
     let params = AicParams::new(gains, 0.001).unwrap();

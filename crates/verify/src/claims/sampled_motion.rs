@@ -277,6 +277,12 @@ impl<T: Field> SampledLoop<T> {
         [motion.torque, motion.torque_behind]
     }
 
+    /// The states z at the sample and at the next.
+    pub fn states(&self, reach: Reach) -> [Vec<Row<T>>; 2] {
+        let motion = self.motion(reach);
+        [motion.before, motion.after]
+    }
+
     /// Samples of delay.
     pub fn delay(&self) -> usize {
         self.delay
@@ -417,6 +423,15 @@ impl<T: Field> SampledLoop<T> {
         let motion = self.motion(Reach::Sample);
         let mut form = self.value(&motion, x, at);
         self.add_bound(&mut form, &-T::one(), &self.speed, &motion.dq, &motion.torque, at);
+        self.add_behind(&mut form, [&-x.growth[0].clone(), &-x.growth[1].clone()], &motion, at);
+        form
+    }
+
+    /// `V - inverse_square |e|^2` with the multipliers of growth.
+    pub(crate) fn distance(&self, x: &SampledUnknowns<T>, at: &Corner<T>, inverse_square: &T) -> Form<T> {
+        let motion = self.motion(Reach::Sample);
+        let mut form = self.value(&motion, x, at);
+        form.add(&-inverse_square.clone(), &motion.before[0], &motion.before[0]);
         self.add_behind(&mut form, [&-x.growth[0].clone(), &-x.growth[1].clone()], &motion, at);
         form
     }
