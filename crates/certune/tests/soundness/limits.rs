@@ -149,7 +149,7 @@ impl Region {
                     distance_norm: None,
                 }
             }
-            other => panic!("{other:?}"),
+            other => unreachable!("{other:?}"),
         }
     }
 
