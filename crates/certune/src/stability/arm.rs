@@ -161,7 +161,10 @@ impl<const N: usize> ArmCertifier<N> {
             }
         }
         options.moving_goal.region = options.region.clone();
-        options.moving_goal.list.clone_from(&request.goals);
+        options.moving_goal.joint_region = options.joint_region.clone();
+        if request.goals.is_some() {
+            options.moving_goal.list.clone_from(&request.goals);
+        }
         Ok(options)
     }
 
