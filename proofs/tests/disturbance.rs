@@ -70,7 +70,8 @@ fn nothing_is_claimed_without_compensation_nor_without_a_disturbance() {
 
 #[test]
 fn louder_noise_and_tighter_bounds_are_rejected() {
-    let stored = stored("disturbance", &derive(DisturbanceOptions { radius_rad: 0.3, ..DisturbanceOptions::default() }, true));
+    let stored =
+        stored("disturbance", &derive(DisturbanceOptions { radius_rad: 0.3, ..DisturbanceOptions::default() }, true));
     let stored = stored.unwrap();
     let rejected = |edit: &dyn Fn(&mut DisturbanceClaim)| {
         let mut document = stored.document().clone();

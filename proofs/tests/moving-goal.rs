@@ -55,7 +55,11 @@ fn a_larger_kappa_a_covers_the_ramped_task_in_its_time() {
         assert!(list.goals.iter().all(|goal| goal.arrival_s.value() <= goal.duration_s.value()));
         // Speed, jumps, five goals that arrive, and the distance at both ends of the inertia.
         assert_eq!(certificate.checked()[1].inequalities.len(), 14);
-        assert_eq!(claim.covered_jumps(certificate.document()).unwrap(), 0, "no goal of the task is near enough for a jump");
+        assert_eq!(
+            claim.covered_jumps(certificate.document()).unwrap(),
+            0,
+            "no goal of the task is near enough for a jump"
+        );
     }
     let speeds = [&derived, &stored].map(|c| claim(c.document()).goal_speed_rad_per_s.to_f64());
     assert!((speeds[0] - speeds[1]).abs() <= 0.01, "{speeds:?}");
@@ -82,7 +86,10 @@ fn what_the_region_does_not_bear_is_rejected() {
     };
     let scaled = |number: &Number, share: f64| Number::decimal(number.to_f64() * share).unwrap();
     assert!(!rejected(&|_| {}), "unchanged, it stands");
-    assert!(!rejected(&|claim| claim.goal_speed_rad_per_s = scaled(&claim.goal_speed_rad_per_s, 0.5)), "slower is fine");
+    assert!(
+        !rejected(&|claim| claim.goal_speed_rad_per_s = scaled(&claim.goal_speed_rad_per_s, 0.5)),
+        "slower is fine"
+    );
     assert!(rejected(&|claim| claim.goal_speed_rad_per_s = scaled(&claim.goal_speed_rad_per_s, 1.01)));
     assert!(rejected(&|claim| claim.jump_rad = scaled(&claim.jump_rad, 1.01)));
     assert!(rejected(&|claim| claim.dwell_s = scaled(&claim.dwell_s, 0.5)));

@@ -194,7 +194,9 @@ impl<const N: usize> ArmCertifier<N> {
         options.moving_goal.sampled_region = request.delay_samples.map(|_| options.sampled_region);
         options.moving_goal.region = options.region.clone();
         options.moving_goal.joint_region = options.joint_region.clone();
-        options.moving_goal.list.clone_from(&request.goals);
+        if request.goals.is_some() {
+            options.moving_goal.list.clone_from(&request.goals);
+        }
         options.joint_region.steps_rad = request.goals.as_ref().map(steps_rad).unwrap_or_default();
         Ok(options)
     }
