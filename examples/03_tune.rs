@@ -8,7 +8,7 @@ use std::path::Path;
 
 use certune::closed_loop::{Gains as GainsTable, GainsFile, Scenario};
 use certune::dynamics::Robot;
-use certune::tune::{AicObjective, Batch, Bench, Gains, Outcome, Question, SearchSettings, Space, tune};
+use certune::tune::{AicObjective, Batch, Bench, Gains, ObjectiveName, Outcome, Question, SearchSettings, Space, tune};
 use certune::verify::ClaimKind;
 use certune::{ArmCertifier, family_of};
 
@@ -34,6 +34,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
         robot_sha256: robot.sha256(),
         scenario: scenario.name.clone(),
         versions: BTreeMap::from([("certune".to_owned(), env!("CARGO_PKG_VERSION").to_owned())]),
+        objective: ObjectiveName::SettlingCost,
         search: SearchSettings::new(space.method(), evaluations, seed),
         batch_plants: 2,
         held_out_plants: 4,
@@ -58,7 +59,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let record = &tuned.record;
     let winner = record.winner().ok_or("nothing was certified")?;
     let certificate = tuned.certificate.ok_or("a winner has its certificate")?;
-    let cost = |outcome: Outcome| outcome.cost_s().ok_or("a run without a cost");
+    let cost = |outcome: Outcome| outcome.cost().ok_or("a run without a cost");
     let start_s = cost(record.start().ok_or("the published gains are evaluated first")?.outcome)?;
     let winner_s = cost(winner.outcome)?;
     println!(

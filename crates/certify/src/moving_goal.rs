@@ -5,13 +5,18 @@
 //! a short move is nearly a jump, which only the radius limits.
 
 use certune_verify::{
-    Claim, ClaimKind, Document, GoalList, ListedGoal, MovingGoalClaim, Number, Reason, RegionClaim,
-    moving_goal_inequalities,
+    Claim, ClaimKind, Document, GoalList, ListedGoal, MovingGoalClaim, Norm, Number, Reason, moving_goal_inequalities,
+    region_norm,
 };
+use num_rational::BigRational;
+use num_traits::ToPrimitive;
 
+use crate::digits::{above, down, readable};
+use crate::joint_region::{JointRegionOptions, joint_region};
 use crate::not_proved;
 use crate::problem::Problem;
 use crate::region::{RegionOptions, region};
+use crate::sampled_region::{SampledRegionOptions, sampled_region};
 
 /// Goals that follow each other.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,8 +36,12 @@ pub struct MovingGoalOptions {
     pub coarse: usize,
     /// Evaluations after that.
     pub refinements: usize,
-    /// How each region is searched; its rate is not used.
+    /// The region of the sampled loop, when that is the one to rest on; its rate is not used.
+    pub sampled_region: Option<SampledRegionOptions>,
+    /// The region where all joints have the same gains; its rate is not used.
     pub region: RegionOptions,
+    /// The region where they differ; its rate is not used.
+    pub joint_region: JointRegionOptions,
     /// The time for which jumps are certified to be apart, s.
     pub dwell_s: f64,
     /// Goals to cover.
@@ -46,7 +55,9 @@ impl Default for MovingGoalOptions {
             rates_per_s: [0.02, 5.0],
             coarse: 8,
             refinements: 6,
+            sampled_region: None,
             region: RegionOptions::default(),
+            joint_region: JointRegionOptions::default(),
             dwell_s: 6.0,
             list: None,
         }
@@ -61,48 +72,77 @@ pub fn moving_goal(problem: &Problem, document: &Document, options: &MovingGoalO
     if !document.family.gravity_compensation {
         return refused(Reason::FamilyNotCovered);
     }
-    let lists_fit = |list: &GoalListValues| {
-        let joints = document.arm.joints;
-        list.start_rad.len() == joints
-            && !list.goals.is_empty()
-            && list.goals.iter().all(|(goal, duration)| goal.len() == joints && *duration > 0.0)
+    let index = document.claims.len() + 1;
+    let Ok(gains) = document.gains.aic() else { return refused(Reason::OtherController) };
+    let shared = gains.shared_by_all().is_ok();
+    let with_region = |rate_per_s: f64| {
+        let claim = match &options.sampled_region {
+            Some(sampled) => sampled_region(problem, &SampledRegionOptions { rate_per_s, ..*sampled }),
+            None if shared => region(problem, &RegionOptions { rate_per_s, ..options.region.clone() }),
+            None => joint_region(problem, &JointRegionOptions { rate_per_s, ..options.joint_region.clone() }),
+        };
+        let mut extended = document.clone();
+        extended.claims.push(claim.into());
+        extended
     };
-    if !options.list.as_ref().is_none_or(lists_fit) || !(options.dwell_s > 0.0) {
-        return refused(Reason::OutOfRange);
-    }
-    let at_rate = |rate: f64| match region(problem, &RegionOptions { rate_per_s: rate, ..options.region.clone() }) {
-        Claim::Region(claim) => Ok(claim),
-        other => Err(other),
+    let speed = |rate: f64| {
+        let ramp = region_norm(&with_region(rate), index).ok().and_then(|norm| Ramp::new(&norm));
+        ramp.map_or(0.0, |ramp| ramp.speed(options.list.as_ref()))
     };
-    let speed = |rate: f64| at_rate(rate).map_or(0.0, |claim| Ramp::of(&claim).speed(options.list.as_ref()));
     let Some(rate) = best_rate(speed, options) else {
         // The reason is the region's own, at the least rate.
-        let reason = match at_rate(options.rates_per_s[0]) {
-            Err(Claim::NotProved(claim)) => claim.reason,
-            _ => Reason::Infeasible,
-        };
-        return refused(reason);
+        return refused(match with_region(options.rates_per_s[0]).claims.pop().map(|entry| entry.claim) {
+            Some(Claim::NotProved(claim)) => claim.reason,
+            _ => Reason::OutOfRange,
+        });
     };
-    let Ok(region) = at_rate(rate) else { return refused(Reason::CandidateFailed) };
-    let ramp = Ramp::of(&region);
-    let mut with_region = document.clone();
-    with_region.claims.push(Claim::Region(region.clone()).into());
-    let position = with_region.claims.len();
-    // Rounded to four digits the figures may lie on the boundary: back off until the exact check passes.
-    for shrink in [0.0, 1e-4, 1e-3, 1e-2] {
-        let Some(claim) = candidate(&with_region, &ramp, options, shrink) else { continue };
-        let holds = moving_goal_inequalities(&with_region, position, &claim);
-        if holds.is_ok_and(|all| all.iter().all(|inequality| inequality.smallest_pivot.is_some())) {
-            return vec![Claim::Region(region), Claim::MovingGoal(Box::new(claim))];
-        }
+    let mut extended = with_region(rate);
+    match (moving_goal_on(&extended, index, options), extended.claims.pop()) {
+        (Some(claim), Some(entry)) => vec![entry.claim, Claim::MovingGoal(Box::new(claim))],
+        _ => refused(Reason::CandidateFailed),
     }
-    refused(Reason::CandidateFailed)
 }
 
-/// A rate of three digits, so that it can be read.
-fn readable(rate: f64) -> f64 {
-    format!("{rate:.2e}").parse().unwrap_or(rate)
+/// The claim `moving-goal` that rests on the region which the entry `index` of `document`, counted from 1, proves. `None` when it has no
+/// norm, when the list does not fit the arm, or when no figures pass the exact check.
+pub fn moving_goal_on(document: &Document, index: usize, options: &MovingGoalOptions) -> Option<MovingGoalClaim> {
+    let ramp = Ramp::new(&region_norm(document, index).ok()?)?;
+    if !options.list.as_ref().is_none_or(|list| ramp.fits(list)) {
+        return None;
+    }
+    let position = document.claims.len();
+    let holds = |claim: &MovingGoalClaim| {
+        moving_goal_inequalities(document, position, claim)
+            .is_ok_and(|all| all.iter().all(|inequality| inequality.smallest_pivot.is_some()))
+    };
+    // Rounded to four digits the figures may lie on the boundary: back off until the exact check passes.
+    [0.0, 1e-4, 1e-3, 1e-2].into_iter().find_map(|shrink| {
+        let mut claim = candidate(index, &ramp, options, shrink)?;
+        // The distance is found by asking the checker.
+        let (mut too_small, mut enough) = (0.0, ramp.radius());
+        for _ in 0..MOST_DOUBLINGS {
+            claim.distance_rad = above(enough)?;
+            if holds(&claim) {
+                break;
+            }
+            (too_small, enough) = (enough, 2.0 * enough);
+        }
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (too_small + enough);
+            let tried = MovingGoalClaim { distance_rad: above(middle)?, ..claim.clone() };
+            if holds(&tried) {
+                (claim, enough) = (tried, middle);
+            } else {
+                too_small = middle;
+            }
+        }
+        holds(&claim).then_some(claim)
+    })
 }
+
+/// The distance that a region keeps is at most this many doublings of its radius, and is found to a share of `2^-10`.
+const MOST_DOUBLINGS: usize = 8;
+const HALVINGS: usize = 10;
 
 /// A coarse geometric grid, then halvings of its spacing around the best point. `None` when no rate gives a speed.
 fn best_rate(speed: impl Fn(f64) -> f64, options: &MovingGoalOptions) -> Option<f64> {
@@ -134,24 +174,37 @@ fn best_rate(speed: impl Fn(f64) -> f64, options: &MovingGoalOptions) -> Option<
 /// The figures of a region that a goal meets, in floating point.
 struct Ramp {
     rate: f64,
-    /// The largest jump from rest, rad.
-    radius: f64,
+    /// Weight of each joint's step, 1/rad^2.
+    weights: Vec<f64>,
+    period_s: f64,
 }
 
 impl Ramp {
-    fn of(claim: &RegionClaim) -> Self {
-        let s: Vec<f64> = claim.witness.s.iter().map(Number::to_f64).collect();
-        let weight = match s.as_slice() {
-            [s_00, s_01, _, _, _, s_11, ..] => s_00 + 2.0 * s_01 + s_11,
-            _ => f64::NAN,
-        };
-        Self { rate: claim.rate_per_s.to_f64(), radius: weight.sqrt().recip() }
+    fn new(norm: &Norm) -> Option<Self> {
+        let float = |x: &BigRational| x.to_f64().unwrap_or(f64::NAN);
+        let weights: Vec<f64> = norm.shift_weights.iter().map(float).collect();
+        let (rate, period_s) = (float(&norm.rate), norm.period.as_ref().map_or(0.0, float));
+        let sensible = rate > 0.0 && !weights.is_empty() && weights.iter().all(|weight| *weight > 0.0);
+        sensible.then_some(Self { rate, weights, period_s })
+    }
+
+    /// The largest jump from rest in the joint that bears least, rad.
+    fn radius(&self) -> f64 {
+        self.weights.iter().copied().fold(0.0, f64::max).sqrt().recip()
+    }
+
+    fn fits(&self, list: &GoalListValues) -> bool {
+        let joints = self.weights.len();
+        let fits = |goal: &[f64], duration: f64| goal.len() == joints && duration > 0.0;
+        list.start_rad.len() == joints
+            && !list.goals.is_empty()
+            && list.goals.iter().all(|(goal, duration)| fits(goal, *duration))
     }
 
     /// The fastest goal along the list, or for ever.
     fn speed(&self, list: Option<&GoalListValues>) -> f64 {
-        let for_ever = self.rate * self.radius;
-        let Some(list) = list else { return for_ever };
+        let for_ever = self.rate * self.radius();
+        let Some(list) = list.filter(|list| self.fits(list)) else { return for_ever };
         let (mut covered, mut not) = (for_ever, 2.0 * for_ever);
         while self.covers(list, not) && not < FASTEST_RAD_PER_S {
             (covered, not) = (not, 2.0 * not);
@@ -171,17 +224,25 @@ impl Ramp {
         let mut norm: f64 = 0.0;
         let mut from = &list.start_rad;
         for (goal, duration) in &list.goals {
-            let length = distance(from, goal);
-            let reach = speed / (self.rate * self.radius);
-            let kept = (-self.rate * length / speed).exp();
-            norm = reach + (norm - reach) * kept;
+            let time = distance(from, goal) / speed;
+            if time > 0.0 {
+                let weighted = goal.iter().zip(from).zip(&self.weights).map(|((a, b), s)| s * (a - b).powi(2));
+                let reach = weighted.sum::<f64>().sqrt() / (self.rate * time);
+                norm = reach + (norm - reach) * (-self.rate * time / (1.0 - self.rate * self.period_s)).exp();
+            }
             if !(norm < 1.0) {
                 return false;
             }
-            norm *= (-self.rate * (duration - length / speed).max(0.0)).exp();
+            norm *= (-self.rate * (duration - time - 2.0 * self.period_s).max(0.0)).exp();
             from = goal;
         }
         true
+    }
+
+    /// To the next hundredth of a second, past the rounding of the length; a whole number of samples where there are any.
+    fn arrival_s(&self, from: &[f64], to: &[f64], speed: f64) -> f64 {
+        let time = distance(from, to) / speed * (1.0 + 1e-6) + 2.0 * self.period_s;
+        (time * 100.0).ceil() / 100.0
     }
 }
 
@@ -192,26 +253,8 @@ fn distance(from: &[f64], to: &[f64]) -> f64 {
     from.iter().zip(to).map(|(a, b)| (b - a).powi(2)).sum::<f64>().sqrt()
 }
 
-/// Four digits, rounded down.
-fn down(x: f64) -> Option<Number> {
-    digits(x, f64::floor)
-}
-
-/// Four digits, rounded up.
-fn above(x: f64) -> Option<Number> {
-    digits(x, f64::ceil)
-}
-
-fn digits(x: f64, round: fn(f64) -> f64) -> Option<Number> {
-    if !(x > 0.0 && x.is_finite()) {
-        return None;
-    }
-    let decade = x.log10().floor() as i32 - 3;
-    let text = format!("{:.0}e{decade}", round(x / 10_f64.powi(decade)));
-    Number::decimal(text.parse().ok()?)
-}
-
-fn candidate(document: &Document, ramp: &Ramp, options: &MovingGoalOptions, shrink: f64) -> Option<MovingGoalClaim> {
+/// The claim without its distance.
+fn candidate(region: usize, ramp: &Ramp, options: &MovingGoalOptions, shrink: f64) -> Option<MovingGoalClaim> {
     let smaller = 1.0 - shrink;
     let numbers = |values: &[f64]| values.iter().map(|&x| Number::decimal(x)).collect::<Option<Vec<_>>>();
     let list = match &options.list {
@@ -221,8 +264,7 @@ fn candidate(document: &Document, ramp: &Ramp, options: &MovingGoalOptions, shri
             let mut from = &list.start_rad;
             let mut goals = Vec::with_capacity(list.goals.len());
             for (goal, duration) in &list.goals {
-                // To the next hundredth of a second, and past the rounding of the length.
-                let arrival = (distance(from, goal) / speed.to_f64() * (1.0 + 1e-6) * 100.0).ceil() / 100.0;
+                let arrival = ramp.arrival_s(from, goal, speed.to_f64());
                 goals.push(ListedGoal {
                     goal_rad: numbers(goal)?,
                     duration_s: Number::decimal(*duration)?,
@@ -233,38 +275,13 @@ fn candidate(document: &Document, ramp: &Ramp, options: &MovingGoalOptions, shri
             Some(GoalList { start_rad: numbers(&list.start_rad)?, speed_rad_per_s: speed, goals })
         }
     };
-    let region = document.claims.last().map(|entry| &entry.claim)?;
-    let Claim::Region(claim) = region else { return None };
+    let kept = (-ramp.rate * options.dwell_s).exp();
     Some(MovingGoalClaim {
-        region: document.claims.len(),
-        goal_speed_rad_per_s: down(ramp.rate * ramp.radius * smaller)?,
-        jump_rad: down(ramp.radius * (1.0 - (-ramp.rate * options.dwell_s).exp()) * smaller)?,
+        region,
+        goal_speed_rad_per_s: down(ramp.rate * ramp.radius() * smaller)?,
+        jump_rad: down(ramp.radius() * (1.0 - kept) * smaller)?,
         dwell_s: Number::decimal(options.dwell_s)?,
-        distance_rad: above(largest_error(document, claim)? / smaller)?,
+        distance_rad: Number::zero(),
         list,
     })
-}
-
-/// The largest `|e|` where `V <= 1`: the root of the first entry of the inverse of `P(m)`, at the worse end.
-fn largest_error(document: &Document, claim: &RegionClaim) -> Option<f64> {
-    let witness = &claim.witness;
-    let bounds = &document.constants.bounds;
-    let mut worst: f64 = 0.0;
-    for m in [&bounds.m_lo_kg_m2, &bounds.m_hi_kg_m2] {
-        let m = m.to_f64();
-        // dq scaled by 1/sqrt m; the rest is left as it is.
-        let mut form = nalgebra::DMatrix::zeros(6, 6);
-        form[(0, 0)] = witness.p.to_f64();
-        for (k, b) in witness.b.iter().enumerate() {
-            form[(0, 1 + k)] = m.sqrt() * b.to_f64();
-            form[(1 + k, 0)] = form[(0, 1 + k)];
-        }
-        let places = (0..5).flat_map(|i| (i..5).map(move |j| (i, j)));
-        for ((i, j), s) in places.zip(&witness.s) {
-            form[(1 + i, 1 + j)] = s.to_f64();
-            form[(1 + j, 1 + i)] = s.to_f64();
-        }
-        worst = worst.max(form.try_inverse()?[(1, 1)]);
-    }
-    Some(worst.sqrt() * (1.0 + 1e-9))
 }

@@ -337,7 +337,7 @@ fn best_rho(solution: impl Fn(f64) -> Option<(f64, f64)>, options: &RegionOption
 }
 
 /// The least gain of V at the start for which another solution is sought: half of it in the radius.
-const WORTHWHILE: f64 = 5e-4;
+pub(crate) const WORTHWHILE: f64 = 5e-4;
 
 /// A floating-point number as the dyadic it is.
 pub(crate) fn dyadics(values: impl IntoIterator<Item = f64>) -> Option<Vec<Number>> {

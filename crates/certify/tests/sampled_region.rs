@@ -114,7 +114,7 @@ fn a_document_with_the_claim_is_accepted_and_wider_figures_are_not() {
         sampled_region: SampledRegionOptions { torque_limit_n_m: Some(87.0), ..SampledRegionOptions::default() },
         ..Options::default()
     };
-    let certificate = certify(&problem, &[ClaimKind::SampledRegion], &options, &|| None).unwrap();
+    let certificate = certify(&problem, &[ClaimKind::SampledRegion], &options, &|_| None).unwrap();
     let checked = &certificate.checked()[0];
     assert_eq!(checked.verdict, Verdict::Holds);
     println!("{}", checked.statement);

@@ -4,14 +4,11 @@
 //! holds there as well.
 
 use certune_bounds::enclosure;
-use certune_certify::{
-    CertifyError, EnclosureValues, MracGainValues, Problem, adaptive_convergence, adaptive_sampled, pi_exponential,
-    to_json,
-};
-use certune_control::mrac::{MracGains, MracLaw, MracParams};
-use certune_verify::{Certificate, Claim, ClaimKind, MracLaw as WrittenLaw, seal, verify};
+use certune_certify::{EnclosureValues, Problem, adaptive_convergence, adaptive_sampled, pi_exponential};
+use certune_control::mrac::{MracGains, MracParams};
+use certune_verify::{Certificate, Claim, ClaimKind};
 
-use crate::stability::{ArmCertifier, STEP_S, StabilityError};
+use crate::stability::{Answer, ArmCertifier, ArmGains, STEP_S, StabilityError, checked};
 
 /// A goal, the box around it, and what the sampled claim assumes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,15 +43,20 @@ impl<const N: usize> ArmCertifier<N> {
         setting: &AdaptiveSetting<N>,
         claims: &[ClaimKind],
     ) -> Result<Certificate, StabilityError> {
+        Ok(self.answer_adaptive(gains, setting, claims)?.certificate)
+    }
+
+    pub(crate) fn answer_adaptive(
+        &self,
+        gains: &MracGains<N>,
+        setting: &AdaptiveSetting<N>,
+        claims: &[ClaimKind],
+    ) -> Result<Answer, StabilityError> {
         MracParams::new(gains, STEP_S)?;
         let problem = self.adaptive_problem(gains, setting)?;
-        let mut document = problem.document().clone();
-        for kind in claims {
-            document.claims.push(self.adaptive_claim(&problem, setting, *kind).into());
-        }
-        let text = to_json(&seal(document)).map_err(CertifyError::from)?;
-        let checked = verify(&text, problem.records()).map_err(CertifyError::from)?;
-        Ok(checked.map_err(CertifyError::from)?)
+        let made = claims.iter().map(|kind| self.adaptive_claim(&problem, setting, *kind)).collect();
+        let certificate = checked(problem.document().clone(), made, problem.records())?;
+        Ok(Answer { certificate, records: problem.records().to_vec() })
     }
 
     fn adaptive_claim(&self, problem: &Problem, setting: &AdaptiveSetting<N>, kind: ClaimKind) -> Claim {
@@ -90,24 +92,7 @@ impl<const N: usize> ArmCertifier<N> {
             coriolis_kg_m2: found.coriolis_kg_m2,
             halvings: setting.halvings,
         };
-        let law = match gains.law {
-            MracLaw::ReferenceModel => WrittenLaw::ReferenceModel,
-            MracLaw::RawGoal => WrittenLaw::RawGoal,
-            MracLaw::ReleasedCode => WrittenLaw::ReleasedCode,
-        };
-        let three = |rows: &[[f64; N]; 3]| rows.map(|row| row.to_vec());
-        let written = MracGainValues {
-            law,
-            omega_rad_per_s: gains.omega_rad_per_s.to_vec(),
-            zeta: gains.zeta.to_vec(),
-            l1: gains.l1.to_vec(),
-            l2: gains.l2.to_vec(),
-            alpha: three(&gains.alpha),
-            e0: three(&gains.e0),
-            e1: three(&gains.e1),
-            f0: three(&gains.f0),
-            f1: three(&gains.f1),
-        };
-        Ok(self.problem(written.written()?)?.over_box(&values)?)
+        let written = ArmGains::from(*gains).written()?;
+        Ok(self.problem(written)?.over_box(&values)?)
     }
 }

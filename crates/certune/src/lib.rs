@@ -56,7 +56,11 @@ pub use certune_verify as verify;
 pub mod guide {}
 
 mod adaptive;
+mod lyapunov;
 mod stability;
 
 pub use adaptive::AdaptiveSetting;
-pub use stability::{ArmCertifier, Effort, StabilityError, certificate_text, family_of, poles_per_s};
+pub use stability::{
+    Answer, ArmCertifier, ArmGains, CertifiedObjective, Effort, Growth, Over, Request, StabilityError, TorqueLimits,
+    certificate_text, claims_for, family_of, growth, poles_per_s,
+};

@@ -6,19 +6,22 @@
 
 use num_rational::BigRational;
 
-use crate::claims::{Claim, Inequality, RegionClaim, RegionProblem, SampledRegionClaim, State};
-use crate::document::{ConfigurationSet, Document};
+use crate::claims::{Claim, Inequality};
+use crate::document::Document;
 use crate::error::Flaw;
+use crate::number::Number;
 
 /// The norm of a region and how it shrinks.
 #[derive(Clone, Debug)]
-pub(crate) struct Norm {
+pub struct Norm {
     /// `s_i` of each joint, 1/rad^2: a goal moved by `delta` moves the state by at most the root of `sum_i s_i delta_i^2`.
-    pub(crate) shift_weights: Vec<BigRational>,
+    pub shift_weights: Vec<BigRational>,
     /// `sqrt V` shrinks at least as `exp(-rate t)`, or by `1 - rate h` each sample, 1/s.
-    pub(crate) rate: BigRational,
+    pub rate: BigRational,
     /// The sampling step h, s, where V is a function of the state at sample instants; none in continuous time.
-    pub(crate) period: Option<BigRational>,
+    pub period: Option<BigRational>,
+    /// Each joint stays this close to its goal, rad, when the claim says so.
+    pub kept: Option<Vec<Number>>,
 }
 
 /// A claim about the set `{V <= 1}` that holds for a constant goal and stays meaningful when the goal changes.
@@ -42,56 +45,16 @@ pub(crate) fn region_before(document: &Document, position: usize, index: usize) 
     let earlier = document.claims.get(..position).unwrap_or_default();
     match index.checked_sub(1).and_then(|index| earlier.get(index)).map(|entry| &entry.claim) {
         Some(Claim::Region(claim)) => Ok(claim.as_ref()),
+        Some(Claim::JointRegion(claim)) => Ok(claim.as_ref()),
         Some(Claim::SampledRegion(claim)) => Ok(claim.as_ref()),
         _ => Err(none()),
     }
 }
 
-/// A region's V is a norm for every goal only where gravity is compensated and no set of configurations has to be kept.
-pub(crate) fn require_norm(document: &Document) -> Result<(), Flaw> {
-    if !document.family.gravity_compensation {
-        return Err(Flaw::NotCovered { what: "an arm whose gravity is not compensated" });
-    }
-    match document.constants.over {
-        ConfigurationSet::AllAngles => Ok(()),
-        ConfigurationSet::Box { .. } => Err(Flaw::NotCovered { what: "constants that hold in a box only" }),
-    }
-}
-
-impl Normed for RegionClaim {
-    fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
-        require_norm(document)?;
-        let weight = self.start_weight(document)?;
-        let rate = self.rate_per_s.value().clone();
-        Ok(Norm { shift_weights: vec![weight; document.arm.joints], rate, period: None })
-    }
-
-    fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
-        let problem = RegionProblem::new(document)?;
-        let point = self.checked(document, &problem)?;
-        let inverse_square = (most * most).recip();
-        let ends = problem.inertia.iter().zip(["least", "largest"]);
-        Ok(ends
-            .map(|(m, end)| {
-                let form = problem.within(&point, m, State::Position, &inverse_square);
-                Inequality::decide(format!("distance at the {end} inertia"), &form.0)
-            })
-            .collect())
-    }
-}
-
-/// At samples V is a norm's square up to what the last period must obey; the goal does not occur in that, so a goal step costs the same.
-impl Normed for SampledRegionClaim {
-    fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
-        require_norm(document)?;
-        Ok(Norm {
-            shift_weights: vec![self.goal_step_weight()?; document.arm.joints],
-            rate: self.sampling.rate_per_s.value().clone(),
-            period: Some(self.sampling.step_s.value().clone()),
-        })
-    }
-
-    fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
-        self.error_within(document, most)
-    }
+/// The norm of the region that the entry `index` of a document, counted from 1, proves.
+///
+/// # Errors
+/// [`Flaw`] when there is no such entry, it proves no region, or its V is no norm for every goal.
+pub fn region_norm(document: &Document, index: usize) -> Result<Norm, Flaw> {
+    region_before(document, document.claims.len(), index)?.norm(document)
 }

@@ -10,6 +10,7 @@ use certune::verify::{self, Certificate, Checked};
 use num_traits::ToPrimitive;
 
 use super::runs::label;
+use crate::commands::claims::{growth_in_words, growths};
 use crate::error::Error;
 use crate::run::Run;
 
@@ -40,11 +41,18 @@ pub fn evidence<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -
         verify::Claim::Region(claim) => Some(claim.radius_rad.to_f64()),
         _ => None,
     });
-    let entries = document.claims.iter().zip(certificate.checked());
+    let growth = growths::<N>(robot, certificate)?;
+    let entries = document.claims.iter().zip(certificate.checked()).zip(growth);
+    let rows = entries.map(|((entry, checked), growth)| {
+        let mut row = claim_row(&entry.claim, checked, certificate, slowest);
+        row.counterexample.extend(growth.as_ref().map(growth_in_words));
+        row
+    });
+    let rows = rows.collect();
     Ok(CertificateRecord {
         file_name: "certificate.json".to_owned(),
         sha256: document.sha256.clone(),
-        claims: entries.map(|(entry, checked)| claim_row(&entry.claim, checked, certificate, slowest)).collect(),
+        claims: rows,
         pole_map: Some(PoleMap { configurations: CONFIGURATIONS as u64, poles, certified_rate_per_s }),
         region: Some(RegionRecord { radius_rad, steps: steps(run) }),
     })
@@ -58,12 +66,13 @@ fn grade(grade: verify::Grade) -> Grade {
 }
 
 fn claim_row(claim: &verify::Claim, checked: &Checked, certificate: &Certificate, slowest: Option<f64>) -> Claim {
-    let assumptions = certificate
-        .assumptions()
-        .into_iter()
-        .map(|assumption| Assumption { grade: grade(assumption.grade), text: assumption.text });
+    // The constants are evidence of a grade; the rest says what arm and loop are taken to be.
+    let assumptions = certificate.assumptions().into_iter().enumerate().map(|(index, assumption)| Assumption {
+        grade: (index == 0).then(|| grade(assumption.grade)),
+        text: assumption.text,
+    });
     // The statement alone does not say of which arm, gains and plants it speaks.
-    let about = Assumption { text: certificate.document().about.clone(), grade: Grade::Conditional };
+    let about = Assumption { text: certificate.document().about.clone(), grade: None };
     Claim {
         kind: checked.kind.name().to_owned(),
         verdict: match checked.verdict {

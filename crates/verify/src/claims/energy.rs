@@ -69,7 +69,7 @@ impl<T: Field> Energy<T> {
     }
 
     /// `z'S r` for a list of rows r.
-    fn add_weighted(&self, form: &mut Form<T>, scale: &T, at: &Quantities<T>, rows: &[Row<T>]) {
+    pub(crate) fn add_weighted(&self, form: &mut Form<T>, scale: &T, at: &Quantities<T>, rows: &[Row<T>]) {
         for i in 0..STATES {
             let weights: Vec<T> = (0..STATES).map(|j| self.s(i, j).clone()).collect();
             form.add(scale, &at.z[i], &Row::combination(at.order, &weights, rows));

@@ -25,7 +25,7 @@ use num_traits::{One, Signed, Zero};
 use serde::{Deserialize, Serialize};
 
 use super::{ClaimKind, Figure, Inequality, Provable, all_hold};
-use crate::document::Document;
+use crate::document::{ConfigurationSet, Document};
 use crate::error::Flaw;
 use crate::normed::{Norm, region_before};
 use crate::number::{Number, ratio};
@@ -83,12 +83,26 @@ impl Provable for MovingGoalClaim {
     }
 
     fn sentence(&self, document: &Document) -> String {
+        let sampled = region_before(document, document.claims.len(), self.region)
+            .and_then(|region| region.norm(document))
+            .is_ok_and(|norm| norm.period.is_some());
+        let (changes, instants) = if sampled {
+            (" and changes at sample instants, before the controller's step", " at every sample")
+        } else {
+            ("", "")
+        };
         let mut text = format!(
             "started at rest at the goal, beliefs at the measurement and zero controller torque, the state stays in the set V <= 1 of claim {}, \
-             so that every limit stated there is kept, and the arm within {} rad of the goal, as long as the goal moves at no more than {} rad/s \
-             (2-norm over the joints, along any path); and as long as it jumps by no more than {} rad at a time, at least {} s apart",
+             so that every limit stated there is kept, and the arm{instants} within {} rad of the goal, as long as the goal moves at no more \
+             than {} rad/s (2-norm over the joints, along any path){changes}; and as long as it jumps by no more than {} rad at a time, at least \
+             {} s apart",
             self.region, self.distance_rad, self.goal_speed_rad_per_s, self.jump_rad, self.dwell_s
         );
+        if let ConfigurationSet::Box { .. } = document.constants.over {
+            text.push_str(
+                ", the goal being all the while as far inside the angles the constants hold for as that claim asks",
+            );
+        }
         if let Some(list) = &self.list {
             let late = list.goals.iter().filter(|goal| goal.arrival_s.value() > goal.duration_s.value()).count();
             let _ = write!(
@@ -171,6 +185,7 @@ pub fn moving_goal_inequalities(
     let jumps = square(&(BigRational::one() - left)) - square(claim.jump_rad.value()) * &motion.largest_weight;
     let mut all = vec![positive("speed".to_owned(), speed), positive("jumps".to_owned(), jumps)];
     if let Some(list) = &claim.list {
+        motion.require_inside(document, list)?;
         all.extend(motion.along(document.arm.joints, list)?);
     }
     all.extend(region.error_within(document, claim.distance_rad.value())?);
@@ -191,6 +206,8 @@ struct Motion {
     fastest: BigRational,
     /// The sampling step, 0 in continuous time.
     period: BigRational,
+    /// How close each joint stays to its goal.
+    kept: Option<Vec<Number>>,
 }
 
 /// What the norm is at most, on the way to a goal and when it is reached.
@@ -201,19 +218,35 @@ struct Leg {
 
 impl Motion {
     fn new(norm: Norm) -> Result<Self, Flaw> {
-        let Norm { shift_weights: weights, rate, period } = norm;
+        let Norm { shift_weights: weights, rate, period, kept } = norm;
         let zero = BigRational::zero();
         let period = period.unwrap_or_else(BigRational::zero);
-        let kept = BigRational::one() - &rate * &period;
-        if !rate.is_positive() || !kept.is_positive() {
+        let left = BigRational::one() - &rate * &period;
+        if !rate.is_positive() || !left.is_positive() {
             return Err(Flaw::NotCovered { what: "a region without a positive rate below one per sample" });
         }
         let largest_weight = weights.iter().max().cloned().unwrap_or(zero);
         if !weights.iter().all(Signed::is_positive) {
             return Err(Flaw::NotCovered { what: "a region whose norm does not see the goal" });
         }
-        let fastest = &rate / kept;
-        Ok(Self { weights, largest_weight, rate, fastest, period })
+        let fastest = &rate / left;
+        Ok(Self { weights, largest_weight, rate, fastest, period, kept })
+    }
+
+    /// Constants over a box of angles hold along the way when every goal is inside by as much as its joint may stray: the box is convex.
+    fn require_inside(&self, document: &Document, list: &GoalList) -> Result<(), Flaw> {
+        let ConfigurationSet::Box { lower_rad, upper_rad } = &document.constants.over else { return Ok(()) };
+        let Some(kept) = &self.kept else {
+            return Err(Flaw::NotCovered { what: "a motion that may leave the angles the constants hold for" });
+        };
+        for goal in core::iter::once(&list.start_rad).chain(list.goals.iter().map(|goal| &goal.goal_rad)) {
+            for (((angle, kept), lower), upper) in goal.iter().zip(kept).zip(lower_rad).zip(upper_rad) {
+                let (low, high) = (lower.value() + kept.value(), upper.value() - kept.value());
+                let inside = low <= *angle.value() && *angle.value() <= high;
+                require("goal_rad", angle, inside, "an angle inside those the constants hold for")?;
+            }
+        }
+        Ok(())
     }
 
     /// Between jumps of a sampled loop lies a whole number of samples.

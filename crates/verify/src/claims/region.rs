@@ -36,6 +36,7 @@ use crate::aic::STATES;
 use crate::document::{ConfigurationSet, Document};
 use crate::error::Flaw;
 use crate::form::{Field, Form, Row};
+use crate::normed::{Norm, Normed};
 use crate::number::{Number, positive, ratio};
 use crate::quantity::{require, require_length, require_positive};
 use crate::statement::list;
@@ -255,6 +256,29 @@ impl RegionClaim {
     }
 }
 
+impl Normed for RegionClaim {
+    fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
+        let joints = document.arm.joints;
+        Ok(Norm {
+            shift_weights: vec![self.start_weight(document)?; joints],
+            rate: self.rate_per_s.value().clone(),
+            period: None,
+            kept: self.distance_rad.clone().map(|distance| vec![distance; joints]),
+        })
+    }
+
+    fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
+        let problem = RegionProblem::new(document)?;
+        let point = self.checked(document, &problem)?;
+        let closeness = (most * most).recip();
+        let at = |(m, end): (&BigRational, &str)| {
+            let form = problem.within(&point, m, State::Position, &closeness);
+            Inequality::decide(format!("distance at the {end} inertia"), &form.0)
+        };
+        Ok(problem.inertia.iter().zip(["least", "largest"]).map(at).collect())
+    }
+}
+
 /// What is left of each motor limit when gravity has taken its share.
 pub(crate) fn controller_share(document: &Document, limits: &[Number]) -> Result<Vec<BigRational>, Flaw> {
     require_length("motor_limits_n_m", limits.len(), document.arm.joints)?;
@@ -336,7 +360,7 @@ impl RegionProblem<BigRational> {
 
 impl<T: Field> RegionProblem<T> {
     /// Coordinates (dq, z, ..) at inertia m.
-    fn quantities(order: usize, m: &T) -> Quantities<T> {
+    pub(crate) fn quantities(order: usize, m: &T) -> Quantities<T> {
         let dq = Row::coordinate(order, 0, T::one());
         let z = (0..STATES).map(|k| Row::coordinate(order, Z + k, T::one())).collect();
         Quantities { order, pi: dq.times(m), dq, z }

@@ -26,6 +26,7 @@ use crate::algebra::zeros;
 use crate::document::{ConfigurationSet, Document};
 use crate::error::Flaw;
 use crate::form::Form;
+use crate::normed::{Norm, Normed};
 use crate::number::{Number, positive, unit_interval};
 use crate::quantity::{require, require_length, require_positive};
 
@@ -172,6 +173,21 @@ impl Provable for SampledRegionClaim {
 
     fn prove(&self, document: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
         all_hold(sampled_region_inequalities(document, self)?)
+    }
+}
+
+impl Normed for SampledRegionClaim {
+    fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
+        Ok(Norm {
+            shift_weights: vec![self.goal_step_weight()?; document.arm.joints],
+            rate: self.sampling.rate_per_s.value().clone(),
+            period: Some(self.sampling.step_s.value().clone()),
+            kept: None,
+        })
+    }
+
+    fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
+        Self::error_within(self, document, most)
     }
 }
 
