@@ -49,10 +49,10 @@ impl Default for SampledRegionOptions {
 /// Margins by which the inequalities are tightened, in turn.
 const STRICTNESS: [f64; 4] = [1e-7, 1e-6, 1e-5, 1e-4];
 /// Where `rho` and `speed` are searched first.
-const RHO: [f64; 3] = [0.03, 0.1, 0.3];
-const SPEED: [f64; 4] = [0.004, 0.008, 0.016, 0.032];
+const RHO: [f64; 3] = [0.04, 0.12, 0.36];
+const SPEED: [f64; 3] = [0.005, 0.01, 0.02];
 /// Factors by which the pattern search moves, in turn.
-const MOVES: [f64; 3] = [1.6, 1.25, 1.1];
+const MOVES: [f64; 2] = [1.4, 1.15];
 
 /// The claim `sampled-region` with the largest radius found, or "not proved".
 pub fn sampled_region(problem: &Problem, options: &SampledRegionOptions) -> Claim {

@@ -2,6 +2,8 @@
 //! controller's own code.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "test helpers")]
 
+use std::sync::LazyLock;
+
 use certune::certify::{
     AicGainValues, ArmValues, ConstantValues, FamilyValues, Problem, SampledConstantValues, SampledRegionOptions,
     sampled_region,
@@ -69,15 +71,18 @@ fn problem() -> Problem {
     Problem::new(&arm, gains.written().unwrap(), &family, &ConstantValues::Sampled(constants)).unwrap()
 }
 
-fn claim(delay_samples: usize) -> SampledRegionClaim {
+/// The claims with 0, 1 and 2 samples of delay, searched once.
+static CLAIMS: LazyLock<[SampledRegionClaim; 3]> = LazyLock::new(|| {
     let torque_limit_n_m = Some(LIMIT_N_M);
-    let options = SampledRegionOptions { delay_samples, torque_limit_n_m, ..SampledRegionOptions::default() };
-    assert_eq!(options.compensation, Compensation::Held);
-    match sampled_region(&problem(), &options) {
-        Claim::SampledRegion(claim) => *claim,
-        other => panic!("{other:?}"),
-    }
-}
+    [0, 1, 2].map(|delay_samples| {
+        let options = SampledRegionOptions { delay_samples, torque_limit_n_m, ..SampledRegionOptions::default() };
+        assert_eq!(options.compensation, Compensation::Held);
+        match sampled_region(&problem(), &options) {
+            Claim::SampledRegion(claim) => *claim,
+            other => panic!("{other:?}"),
+        }
+    })
+});
 
 fn uniform(rng: &mut ChaCha8Rng, lower: f64, upper: f64) -> f64 {
     lower + (upper - lower) * ((rng.next_u64() >> 11) as f64 * 2.0_f64.powi(-53))
@@ -232,8 +237,7 @@ fn random_loop<const N: usize>(rng: &mut ChaCha8Rng, delay: usize, size: &[f64; 
 #[test]
 fn the_textbook_joint_obeys_every_claim() {
     let mut rng = ChaCha8Rng::seed_from_u64(0x5EC1);
-    for delay in 0..3 {
-        let claim = claim(delay);
+    for (delay, claim) in CLAIMS.iter().enumerate() {
         let controller = Aic::<1>::new(&AicParams::new(&PUBLISHED, STEP_S).unwrap());
         let mut worst: f64 = 0.0;
         for _ in 0..300 {
@@ -243,7 +247,7 @@ fn the_textbook_joint_obeys_every_claim() {
             let arm = Joint { inertia, friction, stiffness };
             let sizes: [f64; 6] = [1.0, 1.0, 1.0, 1.0, 40.0, 3.0].map(|size| size * uniform(&mut rng, -6.0, 0.0).exp());
             let start = random_loop::<1>(&mut rng, delay, &sizes).step(&controller, &arm, delay);
-            let size = start.value(&claim, &arm).sqrt().recip();
+            let size = start.value(claim, &arm).sqrt().recip();
             assert!(size.is_finite(), "V is positive");
             let scaled = Loop {
                 q: start.q * size,
@@ -258,7 +262,7 @@ fn the_textbook_joint_obeys_every_claim() {
                 torques: start.torques.iter().map(|u| u * size).collect(),
                 mean_behind: start.mean_behind * size,
             };
-            worst = worst.max(scaled.attacked(&claim, &arm, 400));
+            worst = worst.max(scaled.attacked(claim, &arm, 400));
         }
         println!("delay {delay}: radius {}, V+ at most {worst} V", claim.radius_rad);
     }
@@ -267,8 +271,7 @@ fn the_textbook_joint_obeys_every_claim() {
 #[test]
 fn the_panda_obeys_every_claim_from_the_boundary() {
     let mut rng = ChaCha8Rng::seed_from_u64(0x5EC2);
-    for delay in 0..3 {
-        let claim = claim(delay);
+    for (delay, claim) in CLAIMS.iter().enumerate() {
         let radius = claim.radius_rad.to_f64();
         let weight = claim.goal_step_weight().unwrap();
         let weight =
@@ -278,16 +281,16 @@ fn the_panda_obeys_every_claim_from_the_boundary() {
             let arm = panda(&mut rng);
             let q = Joints::<7>::from_fn(|_, _| uniform(&mut rng, -3.1, 3.1));
             let start = Loop::at_rest(q, q + direction::<7>(&mut rng) * radius, delay);
-            worst = worst.max(start.clone().attacked(&claim, &arm, 500));
+            worst = worst.max(start.clone().attacked(claim, &arm, 500));
             // A goal step on the way.
             let controller = Aic::<7>::new(&AicParams::new(&PUBLISHED.on_every_joint(), STEP_S).unwrap());
             let on_the_way = (0..200).fold(start, |at, _| at.step(&controller, &arm, delay));
-            let before = on_the_way.value(&claim, &arm).sqrt();
+            let before = on_the_way.value(claim, &arm).sqrt();
             let change = direction::<7>(&mut rng) * ((1.0 - before) / weight.sqrt());
             let moved = Loop { goal: on_the_way.goal + change, ..on_the_way };
-            let after = moved.value(&claim, &arm).sqrt();
+            let after = moved.value(claim, &arm).sqrt();
             assert!(after <= 1.0 + ROUNDING, "goal step: {before} to {after}");
-            worst = worst.max(moved.attacked(&claim, &arm, 300));
+            worst = worst.max(moved.attacked(claim, &arm, 300));
         }
         println!("delay {delay}: radius {radius}, V+ at most {worst} V");
     }
@@ -297,7 +300,7 @@ fn the_panda_obeys_every_claim_from_the_boundary() {
 #[test]
 fn the_mean_velocity_keeps_within_its_bounds() {
     let mut rng = ChaCha8Rng::seed_from_u64(0x5EC3);
-    let claim = claim(1);
+    let claim = &CLAIMS[1];
     let witness = &claim.witness;
     let problem = problem();
     let motion = sampled_loop(problem.document(), &claim.sampling, &witness.rho, &witness.speed).unwrap().to_f64();
@@ -340,7 +343,7 @@ fn the_matrices_are_the_controllers_law() {
     let controller = Aic::<1>::new(&AicParams::new(&PUBLISHED, STEP_S).unwrap());
     let problem = problem();
     for delay in 0..3 {
-        let mut sampling = claim(1).sampling;
+        let mut sampling = CLAIMS[1].sampling.clone();
         sampling.delay_samples = delay;
         let [rho, speed] = ["0.1", "0.01"].map(|text| text.parse::<Number>().unwrap());
         let motion = sampled_loop(problem.document(), &sampling, &rho, &speed).unwrap().to_f64();
