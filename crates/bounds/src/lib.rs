@@ -47,6 +47,8 @@ mod enclosure;
 mod error;
 mod maximise;
 mod quantity;
+pub mod riccati;
+pub mod rigorous;
 mod sampled;
 mod sequence;
 

@@ -321,8 +321,12 @@ impl Search {
             (0..4).map(|k| share(self.arm.start[k].is_some(), x[START + k])).collect::<Option<Vec<_>>>()?;
         let excursion = above((1.0 + shrink) * self.excursion_rad(x))?;
         let level: f64 = disturbance_shares.iter().map(Number::to_f64).sum();
-        let ultimate =
-            if level > 0.0 { above(excursion.to_f64() * level.sqrt() * (1.0 + 1e-9))? } else { Number::zero() };
+        let ultimate = match above(excursion.to_f64() * level.sqrt() * (1.0 + 1e-9)) {
+            None => Number::zero(),
+            // Rounding up must not take it beyond the excursion, which is below it by the shares' own margin.
+            Some(rounded) if rounded.value() > excursion.value() => excursion.clone(),
+            Some(rounded) => rounded,
+        };
         Some(DisturbanceClaim {
             rate_per_s: Number::decimal(rate)?,
             excursion_rad: excursion,

@@ -12,9 +12,11 @@ use num_rational::BigRational;
 use num_traits::ToPrimitive;
 
 use crate::digits::{above, down, readable};
+use crate::joint_region::{JointRegionOptions, joint_region};
 use crate::not_proved;
 use crate::problem::Problem;
 use crate::region::{RegionOptions, region};
+use crate::sampled_region::{SampledRegionOptions, sampled_region};
 
 /// Goals that follow each other.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,8 +36,12 @@ pub struct MovingGoalOptions {
     pub coarse: usize,
     /// Evaluations after that.
     pub refinements: usize,
-    /// How each region is searched; its rate is not used.
+    /// The region of the sampled loop, when that is the one to rest on; its rate is not used.
+    pub sampled_region: Option<SampledRegionOptions>,
+    /// The region where all joints have the same gains; its rate is not used.
     pub region: RegionOptions,
+    /// The region where they differ; its rate is not used.
+    pub joint_region: JointRegionOptions,
     /// The time for which jumps are certified to be apart, s.
     pub dwell_s: f64,
     /// Goals to cover.
@@ -49,7 +55,9 @@ impl Default for MovingGoalOptions {
             rates_per_s: [0.02, 5.0],
             coarse: 8,
             refinements: 6,
+            sampled_region: None,
             region: RegionOptions::default(),
+            joint_region: JointRegionOptions::default(),
             dwell_s: 6.0,
             list: None,
         }
@@ -65,9 +73,15 @@ pub fn moving_goal(problem: &Problem, document: &Document, options: &MovingGoalO
         return refused(Reason::FamilyNotCovered);
     }
     let index = document.claims.len() + 1;
-    let with_region = |rate: f64| {
+    let Ok(gains) = document.gains.aic() else { return refused(Reason::OtherController) };
+    let shared = gains.shared_by_all().is_ok();
+    let with_region = |rate_per_s: f64| {
+        let claim = match &options.sampled_region {
+            Some(sampled) => sampled_region(problem, &SampledRegionOptions { rate_per_s, ..*sampled }),
+            None if shared => region(problem, &RegionOptions { rate_per_s, ..options.region.clone() }),
+            None => joint_region(problem, &JointRegionOptions { rate_per_s, ..options.joint_region.clone() }),
+        };
         let mut extended = document.clone();
-        let claim = region(problem, &RegionOptions { rate_per_s: rate, ..options.region.clone() });
         extended.claims.push(claim.into());
         extended
     };

@@ -213,7 +213,7 @@ impl Candidate {
             }
         }
         let mut multiplier = |used: bool, unit: f64| if used { next(true) * unit } else { 0.0 };
-        let mean = motion.remainder().recip();
+        let mean = motion.mean_bounds()[0][0].recip();
         let span = motion.friction()[1].max(1e-3).powi(-2);
         let mut four = || {
             [
@@ -274,7 +274,7 @@ impl Candidate {
             if let Some(friction) = friction {
                 row -= change.row(friction) * (sign * lead);
             }
-            row[mean] += motion.remainder().sqrt() / root;
+            row[mean] += motion.mean_bounds()[0][0].sqrt() / root;
             change.set_row(mean, &(row * scale));
         }
         change
@@ -317,15 +317,7 @@ impl Candidate {
             }
         }
         blocks.push(Box::new(|x| DMatrix::from_element(1, 1, self.unknowns(x).theta)));
-        let t0 = std::time::Instant::now();
-        let r = Program { cost, nonnegative, blocks }.solve();
-        println!(
-            "{:?} {strictness} {:?} {:?}",
-            self.bounds,
-            t0.elapsed(),
-            r.as_ref().map(|s| (s.accurate, self.unknowns(&s.x).s[0][0]))
-        );
-        let x = r.ok()?.x;
+        let x = Program { cost, nonnegative, blocks }.solve().ok()?.x;
         let found = Found { x: self.unknowns(&x), bounds: self.bounds, points: self.points.clone() };
         (found.start() > 0.0).then_some(found)
     }

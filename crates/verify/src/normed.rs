@@ -46,6 +46,7 @@ pub(crate) fn region_before(document: &Document, position: usize, index: usize) 
     match index.checked_sub(1).and_then(|index| earlier.get(index)).map(|entry| &entry.claim) {
         Some(Claim::Region(claim)) => Ok(claim.as_ref()),
         Some(Claim::JointRegion(claim)) => Ok(claim.as_ref()),
+        Some(Claim::SampledRegion(claim)) => Ok(claim.as_ref()),
         _ => Err(none()),
     }
 }

@@ -12,8 +12,10 @@ mod not_proved;
 mod pi_exponential;
 mod refused;
 mod region;
+mod sampled;
 mod sampled_motion;
 mod sampled_region;
+mod variation;
 
 use num_rational::BigRational;
 use serde::{Deserialize, Serialize};
@@ -29,6 +31,7 @@ pub use adaptive_convergence::{
 pub use adaptive_sampled::{AdaptiveSampledClaim, AdaptiveSampledRefusedClaim};
 pub use disturbance::{DisturbanceClaim, DisturbanceWitness, DisturbedArm, disturbance_inequalities};
 pub use energy::{Energy, Plant, Point, State, TRIANGLE, triangle};
+pub(crate) use exponential::in_words;
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
 pub use joint_region::{
     CoveredSteps, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights, joint_region_inequalities,
@@ -39,10 +42,12 @@ pub use not_proved::{NotProvedClaim, Reason};
 pub use pi_exponential::{PiExponentialClaim, PiRefusedClaim, pi_inequalities};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
 pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
+pub use sampled::{LoopTiming, SampledClaim};
 pub use sampled_motion::{Coordinates, Corner, Reach, SampledLoop, SampledUnknowns};
 pub use sampled_region::{
     Compensation, SampledRegionClaim, SampledRegionWitness, Sampling, sampled_loop, sampled_region_inequalities,
 };
+pub use variation::{Quantity, Variation};
 
 /// What an entry of a document claims.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,6 +55,8 @@ pub use sampled_region::{
 pub enum Claim {
     /// Every linearised loop of the family decays at a rate.
     Exponential(ExponentialClaim),
+    /// Every linearised loop of the family decays when the controller is sampled and delayed.
+    Sampled(Box<SampledClaim>),
     /// The nonlinear loop decays from every start in a ball.
     Region(Box<RegionClaim>),
     /// The adaptive loop's error converges.
@@ -86,6 +93,7 @@ impl Claim {
     pub(crate) fn provable(&self) -> &dyn Provable {
         match self {
             Self::Exponential(claim) => claim,
+            Self::Sampled(claim) => claim.as_ref(),
             Self::Region(claim) => claim.as_ref(),
             Self::AdaptiveConvergence(claim) => claim.as_ref(),
             Self::AdaptiveRefused(claim) => claim.as_ref(),
@@ -119,6 +127,7 @@ impl Claim {
             | Self::LyapunovRefused(_) => Verdict::Refused,
             Self::NotProved(_) => Verdict::NotProved,
             Self::Exponential(_)
+            | Self::Sampled(_)
             | Self::Region(_)
             | Self::JointRegion(_)
             | Self::MovingGoal(_)

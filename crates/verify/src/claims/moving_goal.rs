@@ -83,10 +83,19 @@ impl Provable for MovingGoalClaim {
     }
 
     fn sentence(&self, document: &Document) -> String {
+        let sampled = region_before(document, document.claims.len(), self.region)
+            .and_then(|region| region.norm(document))
+            .is_ok_and(|norm| norm.period.is_some());
+        let (changes, instants) = if sampled {
+            (" and changes at sample instants, before the controller's step", " at every sample")
+        } else {
+            ("", "")
+        };
         let mut text = format!(
             "started at rest at the goal, beliefs at the measurement and zero controller torque, the state stays in the set V <= 1 of claim {}, \
-             so that every limit stated there is kept, and the arm within {} rad of the goal, as long as the goal moves at no more than {} rad/s \
-             (2-norm over the joints, along any path); and as long as it jumps by no more than {} rad at a time, at least {} s apart",
+             so that every limit stated there is kept, and the arm{instants} within {} rad of the goal, as long as the goal moves at no more \
+             than {} rad/s (2-norm over the joints, along any path){changes}; and as long as it jumps by no more than {} rad at a time, at least \
+             {} s apart",
             self.region, self.distance_rad, self.goal_speed_rad_per_s, self.jump_rad, self.dwell_s
         );
         if let ConfigurationSet::Box { .. } = document.constants.over {
