@@ -4,7 +4,7 @@
 use certune::control::mrac::{MracGains, MracLaw};
 use certune::dynamics::{Model, Robot, mass_matrix};
 use certune::linsys::{Continuous, Joints, Loop};
-use certune::verify::{Certificate, Claim, ClaimKind};
+use certune::verify::{Certificate, Claim, ClaimKind, checked_alone};
 use certune::{AdaptiveSetting, ArmCertifier};
 use nalgebra::DMatrix;
 use proofs::{A, B, C, nominal_family, published_mrac, stored};
@@ -124,4 +124,15 @@ fn the_stored_certificate_is_the_one_derived() {
     let stored = stored("pi-exponential", &derived).unwrap();
     assert!(stored.all_hold());
     assert!((accumulated(&stored) - accumulated(&derived)).abs() < 0.05);
+}
+
+#[test]
+fn a_goal_outside_the_configurations_of_the_constants_is_not_covered() {
+    let certificate = claim(&arm([0.0, 3.0]), &gains("simulation"), B);
+    let document = certificate.document();
+    let Claim::PiExponential(found) = &document.claims[0].claim else { panic!("no claim") };
+    let mut elsewhere = found.as_ref().clone();
+    elsewhere.goal_rad[1] = "0.26".parse().unwrap();
+    assert!(checked_alone(document, &Claim::PiExponential(Box::new(elsewhere))).is_err());
+    assert!(checked_alone(document, &document.claims[0].claim).is_ok());
 }
