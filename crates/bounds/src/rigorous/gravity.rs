@@ -216,9 +216,8 @@ impl<const N: usize> GravitySweep<N> {
         (self.first..N).all(|a| {
             let mut left = [0.0; N];
             for b in self.first..=a {
-                let sum: f64 = (self.first..N)
-                    .map(|k| entry(a, k)[0] * entry(k, b)[0] + entry(a, k)[1] * entry(k, b)[1])
-                    .sum();
+                let sum: f64 =
+                    (self.first..N).map(|k| entry(a, k)[0] * entry(k, b)[0] + entry(a, k)[1] * entry(k, b)[1]).sum();
                 left[b - self.first] = -sum;
             }
             let i = a - self.first;
@@ -240,7 +239,9 @@ impl<const N: usize> GravitySweep<N> {
         for j in self.first..N {
             let v = &outer.torque[j];
             let across = (v[0] * v[0] + v[1] * v[1]).sqrt();
-            let most = |radius: f64| (self.along * v[2].abs() + radius * across) * (1.0 + 16.0 * UNIT) + self.torque_allowance[j];
+            let most = |radius: f64| {
+                (self.along * v[2].abs() + radius * across) * (1.0 + 16.0 * UNIT) + self.torque_allowance[j]
+            };
             if most(self.radius) <= state.torque[j] {
                 continue;
             }

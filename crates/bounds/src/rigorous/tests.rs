@@ -141,9 +141,8 @@ fn rounding_is_bounded<const N: usize>(chain: &Chain<N, f64>) {
 
     let grid: Vec<Points> = (0..N).map(|_| nodes(16).unwrap()).collect();
     let coriolis = CoriolisSweep::new(chain, chain, &grid);
-    let error = (2..N)
-        .map(|j| worst(chain, &grid, |c, x| slopes_at(c, x)[j], |c, x| slopes_at(c, x)[j]))
-        .fold(0.0, f64::max);
+    let error =
+        (2..N).map(|j| worst(chain, &grid, |c, x| slopes_at(c, x)[j], |c, x| slopes_at(c, x)[j])).fold(0.0, f64::max);
     assert!(error > 0.0 && error <= coriolis.allowance(), "{error} against {}", coriolis.allowance());
     // What rounding costs is nowhere near the digits that are reported.
     for allowance in [inertia.allowance(), gravity.allowance(), coriolis.allowance()] {
