@@ -4,12 +4,15 @@
 //! `certificates/<name>.json`. `cargo xtask claims` writes the certificates again.
 #![forbid(unsafe_code)]
 
+pub mod map;
+
 use std::path::{Path, PathBuf};
 
-use certune::certify::{Claims, FamilyValues};
+use certune::certify::FamilyValues;
 use certune::closed_loop::{FileError, Gains, GainsFile, KeyError};
+use certune::control::mrac::MracGains;
 use certune::dynamics::Robot;
-use certune::verify::{Certificate, Rejection, VerifyError};
+use certune::verify::{Certificate, ClaimKind, Rejection, VerifyError};
 use certune::{ArmCertifier, StabilityError, certificate_text};
 
 /// Why a claim could not be derived or compared.
@@ -22,7 +25,7 @@ pub enum ProofError {
     #[error(transparent)]
     Gains(#[from] KeyError),
     /// The preset is for another controller.
-    #[error("the preset is not for the AIC")]
+    #[error("the preset is not for the controller of the claim")]
     Controller,
     /// The certificate could not be made.
     #[error(transparent)]
@@ -58,12 +61,35 @@ pub fn nominal_family(gravity_compensation: bool, friction_n_m_s_per_rad: [f64; 
 ///
 /// # Errors
 /// [`ProofError`] when the preset or the arm is broken.
-pub fn published(family: &FamilyValues, claims: Claims) -> Result<Certificate, ProofError> {
+pub fn published(family: &FamilyValues, claim: ClaimKind) -> Result<Certificate, ProofError> {
     let text = include_str!("../../tuning/presets/pezzato2020-simulation.toml");
     let file = GainsFile::parse(Path::new("pezzato2020-simulation.toml"), text)?;
     let Gains::Aic(table) = file.gains else { return Err(ProofError::Controller) };
     let gains = table.bind::<7>()?;
-    Ok(ArmCertifier::new(&Robot::panda(), family)?.certify(&gains, claims)?)
+    Ok(ArmCertifier::new(&Robot::panda(), family)?.certify(&gains, &[claim])?)
+}
+
+/// The goals of the pick-and-place task, rad.
+pub const A: [f64; 7] = [1.0, 0.5, 0.0, -2.0, 0.0, 2.5, 0.0];
+/// The second of them.
+pub const B: [f64; 7] = [0.0, 0.2, 0.0, -1.0, 0.0, 1.2, 0.0];
+/// The third of them.
+pub const C: [f64; 7] = [-1.0, 0.5, 0.0, -1.2, 0.0, 1.6, 0.0];
+
+/// The published gains of the adaptive controller, `simulation` or `robot`, with the law of the preset: the released code.
+///
+/// # Errors
+/// [`ProofError`] when there is no such preset or it is broken.
+pub fn published_mrac(name: &str) -> Result<MracGains<7>, ProofError> {
+    let (file, text) = match name {
+        "simulation" => {
+            ("pezzato2020-mrac-simulation.toml", include_str!("../../tuning/presets/pezzato2020-mrac-simulation.toml"))
+        }
+        _ => ("pezzato2020-mrac-robot.toml", include_str!("../../tuning/presets/pezzato2020-mrac-robot.toml")),
+    };
+    let file = GainsFile::parse(Path::new(file), text)?;
+    let Gains::Mrac(table) = file.gains else { return Err(ProofError::Controller) };
+    Ok(table.bind::<7>()?)
 }
 
 /// The stored certificate of a claim, checked; written first when `CERTUNE_WRITE_CLAIMS` is set.
@@ -77,5 +103,5 @@ pub fn stored(name: &str, derived: &Certificate) -> Result<Certificate, ProofErr
         std::fs::write(&path, certificate_text(derived)?).map_err(failed)?;
     }
     let text = std::fs::read_to_string(&path).map_err(failed)?;
-    Ok(certune::verify::verify(&text)??)
+    Ok(certune::verify::verify(&text, &[])??)
 }

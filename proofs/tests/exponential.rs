@@ -1,12 +1,11 @@
 //! `claims/exponential.md` on the Panda: the published simulation gains, gravity not compensated.
 #![expect(clippy::panic, reason = "test helpers")]
 
-use certune::certify::Claims;
-use certune::verify::{Certificate, Claim, Grade, LoopFamily, Number, family_box};
+use certune::verify::{Certificate, Claim, ClaimKind, Grade, LoopFamily, Number, family_box};
 use proofs::{nominal_family, published, stored};
 
 fn rate(certificate: &Certificate) -> f64 {
-    match &certificate.document().claims[0] {
+    match &certificate.document().claims[0].claim {
         Claim::Exponential(claim) => claim.rate_per_s.to_f64(),
         other => panic!("{other:?}"),
     }
@@ -17,7 +16,7 @@ const RATE_STEPS_PER_S: f64 = 0.002;
 
 #[test]
 fn the_published_gains_decay_at_every_configuration_without_gravity_compensation() {
-    let derived = published(&nominal_family(false, [0.0, 0.0]), Claims::Exponential).unwrap();
+    let derived = published(&nominal_family(false, [0.0, 0.0]), ClaimKind::Exponential).unwrap();
     let stored = stored("exponential", &derived).unwrap();
     for certificate in [&derived, &stored] {
         assert!(certificate.all_hold());
@@ -32,8 +31,8 @@ fn the_published_gains_decay_at_every_configuration_without_gravity_compensation
 /// The rate is the largest: exact arithmetic refuses the next step, and the box holds a loop that slow.
 #[test]
 fn the_next_rate_is_not_certified() {
-    let certificate = published(&nominal_family(false, [0.0, 0.0]), Claims::Exponential).unwrap();
+    let certificate = published(&nominal_family(false, [0.0, 0.0]), ClaimKind::Exponential).unwrap();
     let next: Number = format!("{:.3}", rate(&certificate) + 0.001).parse().unwrap();
-    let loops = LoopFamily::new(&certificate.document().gains).unwrap();
+    let loops = LoopFamily::new(certificate.document().gains.aic().unwrap()).unwrap();
     assert!(loops.decays_on(&family_box(certificate.document()), next.value()).is_err());
 }

@@ -10,8 +10,10 @@ use certune::control::aic::{AicGains, AicParams};
 use certune::control::mrac::MracParams;
 use certune::dynamics::{BUILT_IN, MOST_JOINTS, Robot, RobotError};
 use certune::tune::Space;
+use certune::verify::Record;
 
 use crate::error::{Error, Kind};
+use crate::output;
 
 /// Published gains, each file with its source.
 pub const PRESETS: [(&str, &str); 5] = [
@@ -33,6 +35,9 @@ pub const SCENARIOS: [(&str, &str); 5] = [
 
 /// Search spaces.
 pub const SPACES: [(&str, &str); 1] = [("panda-aic", include_str!("../spaces/panda-aic.toml"))];
+
+/// Proved constants, each record of one robot over one set of configurations.
+pub const CONSTANTS: [(&str, &str); 0] = [];
 
 /// The preset that a run is compared with when its search space names none.
 pub const DEFAULT_PRESET: &str = "pezzato2020-simulation";
@@ -201,6 +206,19 @@ fn generic_box() -> PlantBox {
     }
 }
 
+/// The built-in records of proved constants, and those of the files.
+pub fn records(files: &[PathBuf]) -> Result<Vec<Record>, Error> {
+    let built_in = CONSTANTS.iter().map(|(name, text)| record(Path::new(name), text));
+    let given = files.iter().map(|path| record(path, &output::read_file(path)?));
+    built_in.chain(given).collect()
+}
+
+fn record(path: &Path, text: &str) -> Result<Record, Error> {
+    Record::parse(text)
+        .map_err(|source| Error::Record { path: path.to_path_buf(), source })?
+        .map_err(|source| Error::RecordRejected { path: path.to_path_buf(), source })
+}
+
 /// The search space of that file with a name for the record, or the built-in one.
 pub fn space(given: Option<&str>) -> Result<(String, Space), Error> {
     let Text { file, text, .. } = find(Kind::Space, given.unwrap_or(SPACES[0].0), &SPACES)?;
@@ -242,6 +260,15 @@ mod tests {
         for (name, _) in SCENARIOS {
             let scenario = scenario(Some(name), &Robot::panda()).unwrap();
             assert!(scenario.name == name && is_built_in(&scenario));
+        }
+        for record in records(&[]).unwrap() {
+            let robot = Robot::built_in(&record.arm.name).unwrap();
+            assert_eq!(
+                robot.sha256(),
+                record.arm.sha256,
+                "the record is not about this version of `{}`",
+                record.arm.name
+            );
         }
         let (name, space) = space(None).unwrap();
         assert!(name == "panda-aic" && space.start() == Some(DEFAULT_PRESET));

@@ -6,12 +6,19 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+use certune::TorqueLimits;
+use certune::tune::ObjectiveName;
+use certune::verify::ClaimKind;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use crate::commands::{certify, inspect, lists, report, simulate, tune, verify};
 use crate::error::Error;
 use crate::output;
+use crate::values::{
+    ARMS_OWN, Interval, Numbers, claim, delay, interval, non_negative, numbers, objective, share, threads,
+    torque_limits,
+};
 
 const AFTER_HELP: &str = "\
 Examples:
@@ -104,6 +111,9 @@ pub struct TuneArgs {
     /// Scenario by name or TOML file [default: pick-and-place; for a URDF file a generic one]
     #[arg(long, value_name = "NAME|FILE")]
     pub scenario: Option<String>,
+    /// What the search is after [default: as the search space says, or settling-cost]
+    #[arg(long, value_name = "settling-cost|certified-rate|certified-radius", value_parser = objective)]
+    pub objective: Option<ObjectiveName>,
     /// Candidates to evaluate [default: 100]
     #[arg(long, value_name = "N")]
     pub budget: Option<usize>,
@@ -118,14 +128,15 @@ pub struct TuneArgs {
     pub out: Option<PathBuf>,
 }
 
+/// Which configurations a claim speaks of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ClaimName {
-    /// Every linearised loop of the family decays at a rate
-    Exponential,
-    /// The nonlinear arm converges from every start in a ball
-    Region,
-    /// Both
-    All,
+pub enum OverName {
+    /// Every angle of every joint
+    Torus,
+    /// Between the joints' end stops
+    Range,
+    /// A box around the start and the goals of the scenario
+    Scenario,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -141,9 +152,21 @@ pub struct CertifyArgs {
     /// Gains: a preset (see `autotune presets`) or a TOML file
     #[arg(long, value_name = "NAME|FILE")]
     pub gains: String,
-    /// Claim to examine
-    #[arg(long, value_enum, default_value_t = ClaimName::All)]
-    pub claim: ClaimName,
+    /// Claims to examine, by name, separated by commas [default: all that apply to the controller]
+    #[arg(long = "claim", value_name = "NAME", value_parser = claim, value_delimiter = ',')]
+    pub claims: Vec<ClaimKind>,
+    /// Samples from a command to its torque, for the claims about the sampled loop [default: 0]
+    #[arg(long, value_name = "K", value_parser = delay, allow_hyphen_values = true)]
+    pub delay: Option<usize>,
+    /// Respect torque limits: the arm's own less gravity's share, or, with a number, this 2-norm of the controller's torque
+    #[arg(long, value_name = "N_M", value_parser = torque_limits, num_args = 0..=1, default_missing_value = ARMS_OWN, allow_negative_numbers = true)]
+    pub torque_limits: Option<TorqueLimits>,
+    /// Configurations that the claims speak of [default: torus]
+    #[arg(long, value_name = "torus|range|scenario", hide_possible_values = true)]
+    pub over: Option<OverName>,
+    /// Configuration of the claims about one (lyapunov, and all about MRAC), rad, separated by commas [default: the scenario's first goal]
+    #[arg(long, value_name = "LIST", value_parser = numbers, allow_hyphen_values = true)]
+    pub at: Option<Numbers>,
     /// Claim it for every plant of this scenario's plant box, instead of the five options below
     #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["gravity_compensation", "friction", "payload", "mass_uncertainty", "rotor_inertia"])]
     pub scenario: Option<String>,
@@ -162,6 +185,9 @@ pub struct CertifyArgs {
     /// Rotor inertia of every joint, kg m² [default: the robot's own]
     #[arg(long, value_name = "X|MIN..MAX", value_parser = interval, allow_hyphen_values = true)]
     pub rotor_inertia: Option<Interval>,
+    /// A record of proved constants that the claims may rest on, besides the built-in ones; may be repeated
+    #[arg(long, value_name = "FILE.json")]
+    pub constants: Vec<PathBuf>,
     /// Write the certificate to this file
     #[arg(long, value_name = "FILE")]
     pub out: Option<PathBuf>,
@@ -170,8 +196,14 @@ pub struct CertifyArgs {
 #[derive(Debug, Args)]
 pub struct VerifyArgs {
     /// Certificate files
-    #[arg(required = true, value_name = "CERTIFICATE.json")]
+    #[arg(required_unless_present = "full", value_name = "CERTIFICATE.json")]
     pub files: Vec<PathBuf>,
+    /// Derive the proved constants again from the arm, which takes minutes; without a file, all built-in ones
+    #[arg(long)]
+    pub full: bool,
+    /// A record of proved constants that certificates may rest on, besides the built-in ones; may be repeated
+    #[arg(long, value_name = "FILE.json")]
+    pub constants: Vec<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -233,57 +265,6 @@ pub struct ReportArgs {
     /// Its last link, if it was named
     #[arg(long, value_name = "LINK", requires = "robot")]
     pub tip: Option<String>,
-}
-
-/// A closed interval of numbers that are not negative.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval(pub [f64; 2]);
-
-/// A list of finite numbers.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Numbers(pub Vec<f64>);
-
-fn finite(text: &str) -> Result<f64, String> {
-    let number: f64 = text.trim().parse().map_err(|_| format!("`{}` is not a number", text.trim()))?;
-    if number.is_finite() { Ok(number) } else { Err(format!("`{}` is not a finite number", text.trim())) }
-}
-
-fn non_negative(text: &str) -> Result<f64, String> {
-    finite(text)
-        .and_then(|number| if number >= 0.0 { Ok(number) } else { Err("expected a number, zero or above".to_owned()) })
-}
-
-fn share(text: &str) -> Result<f64, String> {
-    non_negative(text).and_then(|number| {
-        if number < 1.0 { Ok(number) } else { Err("expected a share of at least 0 and below 1".to_owned()) }
-    })
-}
-
-fn interval(text: &str) -> Result<Interval, String> {
-    let Some((low, high)) = text.split_once("..") else {
-        return non_negative(text).map(|number| Interval([number, number]));
-    };
-    let (low, high) = (non_negative(low)?, non_negative(high)?);
-    if low <= high {
-        Ok(Interval([low, high]))
-    } else {
-        Err(format!("{low} is above {high}; write the smaller number first"))
-    }
-}
-
-fn numbers(text: &str) -> Result<Numbers, String> {
-    let entries = text.split(',').enumerate();
-    let numbers = entries.map(|(index, entry)| finite(entry).map_err(|error| format!("entry {}: {error}", index + 1)));
-    numbers.collect::<Result<_, _>>().map(Numbers)
-}
-
-fn threads(text: &str) -> Result<usize, String> {
-    match text.parse() {
-        Ok(0) => Err("at least 1 thread is needed".to_owned()),
-        Ok(count) if count > 1024 => Err("at most 1024 threads are supported".to_owned()),
-        Ok(count) => Ok(count),
-        Err(_) => Err("expected a number of threads, 1 or more".to_owned()),
-    }
 }
 
 /// What a command that came to an answer says by its exit code.
@@ -363,21 +344,5 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn an_interval_is_a_number_or_two() {
-        assert_eq!(interval("1.5"), Ok(Interval([1.5, 1.5])));
-        assert_eq!(interval("0.5..2"), Ok(Interval([0.5, 2.0])));
-        for bad in ["", "-1", "2..1", "1..", "..2", "a..b", "nan", "0..inf", "1...2"] {
-            assert!(interval(bad).is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn a_list_names_the_entry_that_is_no_number() {
-        assert_eq!(numbers("-1, 0,2e-1"), Ok(Numbers(vec![-1.0, 0.0, 0.2])));
-        assert_eq!(numbers("0,x,1"), Err("entry 2: `x` is not a number".to_owned()));
-        assert!(numbers("0,,1").is_err() && numbers("").is_err() && numbers("nan").is_err());
     }
 }

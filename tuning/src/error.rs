@@ -91,6 +91,12 @@ pub enum Error {
     /// A readable certificate that a run cannot rest on.
     #[error("{}: the certificate is rejected: {source}", path.display())]
     Rejected { path: PathBuf, source: certune::verify::Rejection },
+    /// A record of proved constants that is none.
+    #[error("{}: not a record of proved constants: {source}", path.display())]
+    Record { path: PathBuf, source: VerifyError },
+    /// A readable record that contradicts itself or was edited.
+    #[error("{}: the record of proved constants is rejected: {source}", path.display())]
+    RecordRejected { path: PathBuf, source: certune::verify::Rejection },
     /// A folder without a file that every run has.
     #[error("cannot read {}: {source}", path.display())]
     NoRun { path: PathBuf, source: io::Error },
@@ -140,6 +146,9 @@ impl Error {
                 Some("`autotune simulate` runs mrac gains; use aic gains here, see `autotune presets`".to_owned())
             }
             Self::ListLength { joints, .. } => Some(format!("{joints} numbers separated by commas, base to tip")),
+            Self::Stability(StabilityError::NoTorqueLimit { .. }) => {
+                Some("--torque-limits with a number, or an `effort` for every joint in the URDF file".to_owned())
+            }
             Self::Stability(StabilityError::Delay { .. }) => Some("a scenario without delay".to_owned()),
             Self::Tune(TuneError::Search(SearchError::NoBudget)) => Some("--budget 1 or more".to_owned()),
             Self::Tune(TuneError::Search(SearchError::Start(_))) => {
@@ -149,6 +158,9 @@ impl Error {
             Self::Io { action: "write", .. } => Some("another place that you may write to".to_owned()),
             Self::Certificate { .. } => Some("the certificate.json of a run, whole and unedited".to_owned()),
             Self::Rejected { .. } => Some("the certificate.json that the run wrote, or repeat the run".to_owned()),
+            Self::Record { .. } | Self::RecordRejected { .. } => {
+                Some("a file that `autotune constants` wrote, whole and unedited".to_owned())
+            }
             Self::NoRun { .. } | Self::RunRecord { .. } | Self::RunInconsistent { .. } => {
                 Some("a folder that `autotune tune` wrote".to_owned())
             }

@@ -4,7 +4,8 @@
 //! |--------|---------------|
 //! | `cli` | the command line's shape, and from there to a command |
 //! | `commands` | one file a command |
-//! | `catalogue` | robots, presets, scenarios and search spaces, by name or by path |
+//! | `values` | values of options: what they may be, and what is said when they are not |
+//! | `catalogue` | robots, presets, scenarios, search spaces and proved constants, by name or by path |
 //! | `run` | a run's folder: `gains.toml`, `run.json`, `certificate.json`, `report.html` |
 //! | `page` | a run's record into the data of its page |
 //! | `output` | tables, wrapped text, JSON, files written whole or not at all |
@@ -23,6 +24,7 @@ mod output;
 mod page;
 mod progress;
 mod run;
+mod values;
 mod versions;
 
 fn main() -> std::process::ExitCode {

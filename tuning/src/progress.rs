@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
-use certune::tune::{Evaluation, Outcome, Progress, Stage, TuneProgress};
+use certune::tune::{Evaluation, ObjectiveName, Outcome, Progress, Stage, TuneProgress};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use crate::output;
@@ -15,13 +15,24 @@ const BAR: &str = "  search {bar:32} {pos}/{len} candidates, {rate}, {eta} left,
 pub struct Terminal {
     bar: ProgressBar,
     verbose: bool,
+    objective: ObjectiveName,
     began: Instant,
 }
 
 impl Terminal {
     pub fn new(verbose: bool) -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-        Self { bar, verbose, began: Instant::now() }
+        Self { bar, verbose, objective: ObjectiveName::SettlingCost, began: Instant::now() }
+    }
+
+    /// The same for a search after another objective than the settling cost.
+    pub fn after(self, objective: ObjectiveName) -> Self {
+        Self { objective, ..self }
+    }
+
+    /// An outcome in words.
+    fn in_words(&self, outcome: Outcome) -> String {
+        in_words(outcome, self.objective)
     }
 
     /// Something without a measurable length begins.
@@ -58,12 +69,24 @@ fn style(template: &str) -> ProgressStyle {
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()).with_key("rate", rate)
 }
 
+/// What a cost means.
+pub fn achieved(cost: f64, objective: ObjectiveName) -> String {
+    match objective {
+        ObjectiveName::SettlingCost => format!("cost {cost:.4} s"),
+        ObjectiveName::CertifiedRate => format!("rate {:.3} /s", cost.recip()),
+        ObjectiveName::CertifiedRadius => format!("radius {:.4} rad", cost.recip()),
+    }
+}
+
 /// An outcome in words.
-pub fn in_words(outcome: Outcome) -> String {
+fn in_words(outcome: Outcome, objective: ObjectiveName) -> String {
     match outcome {
-        Outcome::Certified { cost_s } => format!("certified, cost {:.4} s", cost_s.get()),
-        Outcome::Simulated { cost_s } => format!("cost {:.4} s", cost_s.get()),
-        Outcome::Uncertified { cost_s } => format!("not certified, cost {:.4} s", cost_s.get()),
+        Outcome::Certified { cost } => format!("certified, {}", achieved(cost.get(), objective)),
+        Outcome::Simulated { cost } => achieved(cost.get(), objective),
+        Outcome::Uncertified { cost } if objective == ObjectiveName::SettlingCost => {
+            format!("not certified, {}", achieved(cost.get(), objective))
+        }
+        Outcome::Uncertified { .. } => "not certified".to_owned(),
         Outcome::Unstable { abscissa_per_s } => format!("unstable, grows at {:.3} /s", abscissa_per_s.get()),
         Outcome::Diverged { at_s } => format!("diverged at {:.3} s", at_s.get()),
     }
@@ -73,10 +96,15 @@ impl Progress for Terminal {
     fn evaluated(&self, done: usize, evaluations: usize, evaluation: &Evaluation, best: &Evaluation) {
         self.bar.set_length(evaluations as u64);
         self.bar.set_position(done as u64);
-        self.bar.set_message(format!("best {}", in_words(best.outcome)));
+        self.bar.set_message(format!("best {}", self.in_words(best.outcome)));
         if evaluation.index == best.index {
             self.detail(|| {
-                format!("[{:5.1} s] candidate {}: {}", self.elapsed_s(), evaluation.index, in_words(evaluation.outcome))
+                format!(
+                    "[{:5.1} s] candidate {}: {}",
+                    self.elapsed_s(),
+                    evaluation.index,
+                    self.in_words(evaluation.outcome)
+                )
             });
         }
     }
@@ -96,7 +124,7 @@ impl TuneProgress for Terminal {
                 self.begin(&format!(
                     "certifying candidate {} (attempt {attempt}), {}",
                     candidate.index,
-                    in_words(candidate.outcome)
+                    self.in_words(candidate.outcome)
                 ));
             }
             Stage::Judge => self.begin("judging on held-out plants"),

@@ -212,7 +212,8 @@ impl<const N: usize> ArmBox<N> {
     pub(crate) fn uncertain_links(&self) -> impl Iterator<Item = (&MassGroup<N>, f64)> {
         self.groups.iter().take(N).map(|group| {
             let [lower, upper] = group.scale;
-            let half = if lower < upper { (0.5 * (upper - lower)) * (1.0 + 8.0 * f64::EPSILON) } else { 0.0 };
+            // Scales are of order 1: the ends and the middle are roundings of what was meant.
+            let half = if lower < upper { 0.5 * (upper - lower) + 4.0 * f64::EPSILON } else { 0.0 };
             (group, half)
         })
     }

@@ -37,6 +37,16 @@ pub enum BoundsError {
         /// Upper end, kg m².
         upper: f64,
     },
+    /// A range of a joint's angle that is not a finite, ordered interval.
+    #[error("joint {joint} is {lower} to {upper} rad, expected lower <= upper, both finite")]
+    ConfigurationBox {
+        /// Joint, counted from 1 at the base.
+        joint: usize,
+        /// Lower end, rad.
+        lower: f64,
+        /// Upper end, rad.
+        upper: f64,
+    },
     /// The margin is negative, infinite or not a number.
     #[error("margin is {value}, expected a finite number >= 0 (0.05 means 5 %)")]
     Margin {

@@ -43,6 +43,7 @@ mod arm_box;
 mod ascent;
 mod constants;
 mod eigen;
+mod enclosure;
 mod error;
 mod maximise;
 mod quantity;
@@ -53,6 +54,7 @@ mod sequence;
 
 pub use arm_box::{ArmBox, MassGroup, Member, Ranges};
 pub use constants::{Attained, Constants, Extremes, SampledConstants, SamplingOptions};
+pub use enclosure::{Enclosure, enclosure};
 pub use error::BoundsError;
 pub use maximise::{Axis, Maximum, SearchOptions, maximise};
 pub use sampled::sampled_constants;

@@ -3,8 +3,11 @@
 //! Gains are the decimals a person wrote: the shortest decimal of an `f64` is that text whenever it has at most 15 digits. Constants are
 //! rounded outward to four significant digits, so that the document is readable and no weaker assumption is stated than was sampled.
 
+use std::collections::BTreeMap;
+
 use certune_verify::{
-    AicGains, Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Evidence, Family, Gains, Number, Record,
+    AicGains, Arm, ArmRanges, BoundProof, Bounds, ConfigurationSet, Constants, Document, Evidence, Family, Gains,
+    InertiaEnclosure, MracGains, MracLaw, Number, Record,
 };
 
 /// Gains of the AIC, one number per joint.
@@ -108,6 +111,72 @@ impl AicGainValues {
     }
 }
 
+/// Gains of the MRAC, one number per joint; symbols as in [`MracGains`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct MracGainValues {
+    /// Which form.
+    pub law: MracLaw,
+    /// Natural frequency of the reference model, rad/s.
+    pub omega_rad_per_s: Vec<f64>,
+    /// Its damping ratio.
+    pub zeta: Vec<f64>,
+    /// Weight of the position error.
+    pub l1: Vec<f64>,
+    /// Weight of the velocity error.
+    pub l2: Vec<f64>,
+    /// Proportional, integral and derivative weights of the feed-forward term.
+    pub alpha: [Vec<f64>; 3],
+    /// The same for the gain on q.
+    pub e0: [Vec<f64>; 3],
+    /// The same for the gain on dq.
+    pub e1: [Vec<f64>; 3],
+    /// The same for the gain on the reference position.
+    pub f0: [Vec<f64>; 3],
+    /// The same for the gain on the reference velocity.
+    pub f1: [Vec<f64>; 3],
+}
+
+impl MracGainValues {
+    /// The gains as they are written in a document.
+    ///
+    /// # Errors
+    /// [`ProblemError`] when a number cannot be written.
+    pub fn written(&self) -> Result<Gains, ProblemError> {
+        let three = |quantity, [first, second, third]: &[Vec<f64>; 3]| {
+            Ok([numbers(quantity, first)?, numbers(quantity, second)?, numbers(quantity, third)?])
+        };
+        Ok(Gains::Mrac(MracGains {
+            law: self.law,
+            omega_rad_per_s: numbers("omega_rad_per_s", &self.omega_rad_per_s)?,
+            zeta: numbers("zeta", &self.zeta)?,
+            l1: numbers("l1", &self.l1)?,
+            l2: numbers("l2", &self.l2)?,
+            alpha: three("alpha", &self.alpha)?,
+            e0: three("e0", &self.e0)?,
+            e1: three("e1", &self.e1)?,
+            f0: three("f0", &self.f0)?,
+            f1: three("f1", &self.f1)?,
+        }))
+    }
+}
+
+/// M and the Coriolis form over a box of configurations, proved; four decimals, rounded outward.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EnclosureValues {
+    /// Lower ends of the box, rad.
+    pub lower_rad: Vec<f64>,
+    /// Upper ends, rad.
+    pub upper_rad: Vec<f64>,
+    /// Midpoint of every entry of M, kg m^2.
+    pub midpoint_kg_m2: Vec<Vec<f64>>,
+    /// Radius of every entry, kg m^2.
+    pub radius_kg_m2: Vec<Vec<f64>>,
+    /// Bound of the Coriolis form, kg m^2.
+    pub coriolis_kg_m2: f64,
+    /// How often the box was halved along each joint.
+    pub halvings: u32,
+}
+
 impl SampledConstantValues {
     fn written(&self) -> Result<Constants, ProblemError> {
         let list = |quantity, values: &[f64], outward| {
@@ -131,6 +200,7 @@ impl SampledConstantValues {
                     .as_deref()
                     .map(|values| list("gravity_torque_n_m", values, 1.0))
                     .transpose()?,
+                inertia: None,
             },
             evidence: Evidence::Sampled {
                 margin: number("margin", self.margin)?,
@@ -151,6 +221,12 @@ pub enum ProblemError {
         quantity: &'static str,
         /// The number.
         value: f64,
+    },
+    /// The constants are not known on the whole of a smaller box.
+    #[error("joint {joint} leaves the configurations that the constants are about")]
+    OutsideConstants {
+        /// Joint, counted from 1 at the base.
+        joint: usize,
     },
 }
 
@@ -248,6 +324,62 @@ impl Problem {
             ConstantValues::Proved(record) => vec![record.as_ref().clone()],
         };
         Ok(Self { document, records })
+    }
+
+    /// The same problem with an interval of viscous friction for each joint, `[least, largest]`, N m s/rad.
+    ///
+    /// # Errors
+    /// [`ProblemError`] when a number cannot be written.
+    pub fn with_friction_of_joints(mut self, friction_n_m_s_per_rad: &[[f64; 2]]) -> Result<Self, ProblemError> {
+        self.document.family.friction_n_m_s_per_rad = friction_n_m_s_per_rad
+            .iter()
+            .map(|&ends| interval("friction_n_m_s_per_rad", ends))
+            .collect::<Result<_, _>>()?;
+        Ok(self)
+    }
+
+    /// The same problem over a box of configurations where M is enclosed: what was known over all angles holds there too.
+    ///
+    /// Proved constants become a record of the box that holds the enclosure as well.
+    ///
+    /// # Errors
+    /// [`ProblemError`] when a number cannot be written.
+    pub fn over_box(mut self, values: &EnclosureValues) -> Result<Self, ProblemError> {
+        let matrix = |quantity, rows: &[Vec<f64>]| {
+            rows.iter().map(|row| numbers(quantity, row)).collect::<Result<Vec<_>, ProblemError>>()
+        };
+        let constants = &mut self.document.constants;
+        let (lower_rad, upper_rad) =
+            (numbers("lower_rad", &values.lower_rad)?, numbers("upper_rad", &values.upper_rad)?);
+        if let ConfigurationSet::Box { lower_rad: known_lower, upper_rad: known_upper } = &constants.over {
+            for joint in 0..lower_rad.len() {
+                let inside = |lower: &Number, upper: &Number| {
+                    lower.value() <= lower_rad[joint].value() && upper_rad[joint].value() <= upper.value()
+                };
+                if !known_lower.get(joint).zip(known_upper.get(joint)).is_some_and(|(l, u)| inside(l, u)) {
+                    return Err(ProblemError::OutsideConstants { joint: joint + 1 });
+                }
+            }
+        }
+        constants.over = ConfigurationSet::Box { lower_rad, upper_rad };
+        constants.bounds.inertia = Some(InertiaEnclosure {
+            midpoint_kg_m2: matrix("midpoint_kg_m2", &values.midpoint_kg_m2)?,
+            radius_kg_m2: matrix("radius_kg_m2", &values.radius_kg_m2)?,
+            coriolis_kg_m2: number("coriolis_kg_m2", values.coriolis_kg_m2)?,
+        });
+        let halvings = vec![number("halvings", f64::from(values.halvings))?];
+        for record in &mut self.records {
+            let mut proofs = record.proofs.clone();
+            proofs.push(BoundProof {
+                bound: "inertia".to_owned(),
+                method: "taylor-models".to_owned(),
+                parameters: BTreeMap::from([("halvings".to_owned(), halvings.clone())]),
+            });
+            let (over, bounds) = (constants.over.clone(), constants.bounds.clone());
+            *record = Record { over, bounds, proofs, ..record.clone() }.sealed();
+            constants.evidence = Evidence::Proved { record_sha256: record.sha256.clone() };
+        }
+        Ok(self)
     }
 
     /// The records that the document's constants rest on; none when they were sampled.

@@ -2,11 +2,16 @@
 #![expect(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
 use certune_certify::{
-    AicGainValues, ArmValues, ConstantValues, FamilyValues, Options, Problem, SampledConstantValues, certify,
+    AicGainValues, ArmValues, ConstantValues, FamilyValues, Options, Problem, RegionOptions, SampledConstantValues,
+    certify,
 };
 use certune_verify::{Certificate, Claim, ClaimKind, Verdict};
 
 fn problem(kappa_a: f64, compensated: bool, friction: [f64; 2], margin: f64) -> Problem {
+    from_constants(kappa_a, compensated, friction, constants(margin))
+}
+
+fn from_constants(kappa_a: f64, compensated: bool, friction: [f64; 2], values: SampledConstantValues) -> Problem {
     let all = |x: f64| vec![x; 7];
     let arm =
         ArmValues { name: "panda".to_owned(), joints: 7, sha256: "0".repeat(64), payload_com_m: [0.0, 0.0, 0.307] };
@@ -26,8 +31,12 @@ fn problem(kappa_a: f64, compensated: bool, friction: [f64; 2], margin: f64) -> 
         payload_kg: [0.0, 0.0],
         rotor_inertia_kg_m2: [0.0, 0.0],
     };
+    Problem::new(&arm, gains.written().unwrap(), &family, &ConstantValues::Sampled(values)).unwrap()
+}
+
+fn constants(margin: f64) -> SampledConstantValues {
     let up = 1.0 + margin;
-    let constants = SampledConstantValues {
+    SampledConstantValues {
         m_lo_kg_m2: 0.0044 / up,
         m_hi_kg_m2: 4.659 * up,
         k_g_n_m_per_rad: 69.28 * up,
@@ -39,12 +48,11 @@ fn problem(kappa_a: f64, compensated: bool, friction: [f64; 2], margin: f64) -> 
         margin,
         samples: 1,
         local_starts: 1,
-    };
-    Problem::new(&arm, gains.written().unwrap(), &family, &ConstantValues::Sampled(constants)).unwrap()
+    }
 }
 
 fn claims(problem: &Problem, claim: ClaimKind) -> Certificate {
-    certify(problem, &[claim], &Options::default(), &|| None).unwrap()
+    certify(problem, &[claim], &Options::default(), &|_| None).unwrap()
 }
 
 fn radius(problem: &Problem) -> f64 {
@@ -78,4 +86,37 @@ fn radii_agree_with_cvxpy() {
         println!("compensated {compensated} friction {friction:?} radius {found} in {:?}", start.elapsed());
         assert!(found >= least, "compensated {compensated}, friction {friction:?}: {found}");
     }
+}
+
+/// Constants as wide as bounds over every configuration come out, instead of the truth: what the radii lose.
+#[test]
+fn radii_with_wide_constants_and_limits() {
+    let wide = |friction, compensated, k_r| {
+        let mut values = constants(0.0);
+        (values.m_lo_kg_m2, values.m_hi_kg_m2, values.k_g_n_m_per_rad) = (0.001, 4.97, 71.0);
+        (values.k_c_kg_m2, values.k_r) = (2.6, k_r);
+        from_constants(700.0, compensated, friction, values)
+    };
+    let with = |problem: &Problem, region: RegionOptions| {
+        let start = std::time::Instant::now();
+        let certificate =
+            certify(problem, &[ClaimKind::Region], &Options { region: region.clone(), ..Options::default() }, &|_| {
+                None
+            })
+            .unwrap();
+        let Claim::Region(claim) = &certificate.document().claims[0].claim else {
+            panic!("{:?}", certificate.document().claims[0])
+        };
+        println!("{} rad in {:?}, {region:?}", claim.radius_rad, start.elapsed());
+        claim.radius_rad.to_f64()
+    };
+    let free = RegionOptions::default();
+    let limited = RegionOptions { controller_torque_n_m: Some(87.0), ..free.clone() };
+    let kept = RegionOptions { distance_rad: Some(0.4), ..free.clone() };
+    let rubbing = wide([1.0, 3.0], true, 10.0);
+    assert!(with(&rubbing, free.clone()) >= 0.72);
+    assert!(with(&rubbing, limited) >= 0.69);
+    assert!(with(&rubbing, kept) >= 0.38);
+    assert!(with(&wide([0.0, 0.0], true, 10.0), free.clone()) >= 0.205);
+    assert!(with(&wide([1.0, 3.0], false, 10.0), free) >= 0.235);
 }

@@ -14,7 +14,8 @@
 //! | [`ArmCertifier`] | an arm, its family of plants and a controller, to a certificate |
 //!
 //! ```
-//! use certune::certify::{Claims, FamilyValues};
+//! use certune::certify::FamilyValues;
+//! use certune::verify::ClaimKind;
 //! use certune::{ArmCertifier, control::aic::AicGains, dynamics::Robot};
 //!
 //! let family = FamilyValues {
@@ -33,7 +34,8 @@
 //!     sigma_dmu: [10.0; 7],
 //!     reference_time_constant_s: [1.0; 7],
 //! };
-//! let certificate = ArmCertifier::<7>::new(&Robot::panda(), &family)?.certify(&published, Claims::All)?;
+//! let claims = [ClaimKind::Exponential, ClaimKind::Region];
+//! let certificate = ArmCertifier::<7>::new(&Robot::panda(), &family)?.certify(&published, &claims)?;
 //! assert!(certificate.all_hold());
 //! # Ok::<(), certune::StabilityError>(())
 //! ```
@@ -53,6 +55,12 @@ pub use certune_verify as verify;
 #[doc = include_str!("_docs/architecture.md")]
 pub mod guide {}
 
+mod adaptive;
+mod lyapunov;
 mod stability;
 
-pub use stability::{ArmCertifier, Effort, StabilityError, certificate_text, family_of, poles_per_s};
+pub use adaptive::AdaptiveSetting;
+pub use stability::{
+    Answer, ArmCertifier, ArmGains, CertifiedObjective, Effort, Growth, Over, Request, StabilityError, TorqueLimits,
+    certificate_text, claims_for, family_of, growth, poles_per_s,
+};

@@ -13,6 +13,7 @@
 //! | jitter | `torque_rate_rms_n_m_per_s` | root mean square of `(tau_k - tau_{k-1})/h`, of the torque the motor gives | N m/s |
 //! | ITAE | `itae_rad_s2` | `sum h t \|e\|` | rad s² |
 //!
+//! The goal is the task's, also where the controller's goal is still on its way there.
 //! The torque asked of the motor is the controller's, delayed, plus the gravity compensation. Saturation is counted whether or not
 //! the limit is applied. A joint with `|s| < 1e-3 rad` has neither settling time nor overshoot. The run's first sample has no torque rate.
 //!

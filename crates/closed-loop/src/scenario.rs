@@ -6,8 +6,9 @@
 //! description = "one line"
 //! step_s = 0.001
 //! torque_limits = true                  # default true
+//! goal_speed_rad_per_s = 0.3            # optional: goals move this fast (2-norm over the joints) instead of jumping
 //! start_rad = [0, 0.2, 0, -1, 0, 1.2, 0]
-//! [[segments]]                          # goals, one after the other; each jumps at its start
+//! [[segments]]                          # goals, one after the other; each jumps at its start, or starts to move
 //! goal_rad = [1, 0.5, 0, -2, 0, 2.5, 0]
 //! duration_s = 6
 //! [integrator]                          # optional
@@ -32,6 +33,7 @@
 
 use std::path::Path;
 
+use certune_control::GoalRateLimiter;
 use certune_dynamics::{Payload, Robot, RobotError};
 use certune_linsys::Joints;
 use nalgebra::Vector3;
@@ -154,6 +156,9 @@ pub struct Scenario {
     /// Whether motor torques are limited to the robot's limits.
     #[serde(default = "yes")]
     pub torque_limits: bool,
+    /// The controller's goal moves from one goal to the next at this speed, rad/s (2-norm over the joints); it jumps unless given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub goal_speed_rad_per_s: Option<f64>,
     /// How the plant is integrated.
     #[serde(default)]
     pub integrator: Integrator,
@@ -217,6 +222,7 @@ impl Scenario {
             start_rad: pose(0.0),
             segments: vec![goal(1.0), goal(-1.0), goal(0.0)],
             torque_limits: true,
+            goal_speed_rad_per_s: None,
             integrator: Integrator::default(),
             noise: Noise::default(),
             payloads: Vec::new(),
@@ -264,6 +270,7 @@ impl Scenario {
                 return Err(KeyError::out_of_range(&key, segment.duration_s, "between one and 1e9 steps of `step_s`"));
             }
         }
+        self.goal_limiter()?;
         if self.integrator.substeps == 0 {
             return Err(KeyError::out_of_range("integrator.substeps", 0, "at least 1"));
         }
@@ -291,6 +298,15 @@ impl Scenario {
             }
         }
         self.plant_box.validate()
+    }
+
+    /// What moves the goal, when goals do not jump.
+    fn goal_limiter(&self) -> Result<Option<GoalRateLimiter>, KeyError> {
+        let Some(speed) = self.goal_speed_rad_per_s else { return Ok(None) };
+        let key = "goal_speed_rad_per_s";
+        positive(key, speed)?;
+        let limiter = GoalRateLimiter::new(speed, self.step_s);
+        limiter.map(Some).map_err(|_| KeyError::out_of_range(key, speed, "a speed with a finite way per step"))
     }
 
     fn list(&self, key: &str, values: &[f64]) -> Result<(), KeyError> {
@@ -357,6 +373,7 @@ impl Scenario {
             start: joints("start_rad", &self.start_rad)?,
             segments,
             torque_limits: self.torque_limits,
+            goal_limiter: self.goal_limiter()?,
             integrator: self.integrator,
             noise: self.noise,
             payloads,
@@ -457,6 +474,11 @@ mod tests {
         assert_eq!(edit("mass_uncertainty = 0.2", "mass_uncertainty = 2").0, "plant-box.mass_uncertainty");
         assert_eq!(edit("gravity_compensation", "gravity_compensated").0, "plant-box.gravity_compensated");
         assert_eq!(edit("torque_limits = true", "torque_limits = 1").0, "torque_limits");
+        for bad in ["0", "-0.1", "nan", "inf", "1e-322"] {
+            let limited = format!("torque_limits = true\ngoal_speed_rad_per_s = {bad}");
+            assert_eq!(edit("torque_limits = true", &limited), ("goal_speed_rad_per_s".to_owned(), 7), "{bad}");
+        }
+        assert_eq!(edit("torque_limits = true", "goal_speed_rad_s = 1").0, "goal_speed_rad_s");
         let swap = FILES[3].1;
         assert_eq!(refused(&swap.replacen("release_s = 24", "release_s = 1", 1)).0, "payloads[0].release_s");
         assert_eq!(refused(&swap.replacen("mass_kg = 0.1", "mass_kg = -0.1", 1)).0, "payloads[0].mass_kg");

@@ -4,7 +4,8 @@
 //!
 //! ```text
 //! measure     y   = (q + noise, dq + noise)
-//! control     u_k = controller(y, goal)
+//! goal        r_k = the task's goal, or r_{k-1} moved towards it at the task's goal speed; r_{-1} is the start
+//! control     u_k = controller(y, r_k)
 //! delay       u   = u_{k-d}, zero before the run
 //! compensate  tau = u + g(q)                        if the arm compensates its gravity
 //! limit       tau = clamp(tau, -limit, limit)       if the task asks for limits
@@ -121,7 +122,7 @@ pub struct Sample<'a, const N: usize, S> {
     pub at: State<N>,
     /// What the controller was told.
     pub measurement: Measurement<N>,
-    /// The goal, rad.
+    /// The goal the controller was given, rad: on its way to the task's when the task limits its speed.
     pub goal: Joints<N>,
     /// The torque the controller asks for, before delay, N m.
     pub u: Joints<N>,
@@ -166,6 +167,8 @@ pub struct Simulation<'a, const N: usize, C: Controller<N>> {
     controller_state: C::State,
     commands: [Joints<N>; MAX_DELAY_SAMPLES + 1],
     given: Option<Joints<N>>,
+    /// The goal the controller was given last.
+    goal: Joints<N>,
     noise: Option<ChaCha8Rng>,
     step: u64,
     segment: usize,
@@ -199,6 +202,7 @@ impl<'a, const N: usize, C: Controller<N>> Simulation<'a, N, C> {
             controller_state: controller.start(&first),
             commands: [Joints::zeros(); MAX_DELAY_SAMPLES + 1],
             given: None,
+            goal: task.start,
             noise,
             step: 0,
             segment: 0,
@@ -259,7 +263,9 @@ impl<'a, const N: usize, C: Controller<N>> Simulation<'a, N, C> {
     pub fn advance<R: Recorder<N, C::State>>(&mut self, recorder: &mut R) -> Progress {
         let Progress::Running = self.progress else { return self.progress };
         let (plant, task) = (self.plant, self.task);
-        let goal = task.segments[self.segment].goal;
+        let ordered = task.segments[self.segment].goal;
+        self.goal = task.goal_limiter.map_or(ordered, |limiter| limiter.step(&self.goal, &ordered));
+        let goal = self.goal;
         self.change_loads();
         let measurement = measure(&self.state, task, &mut self.noise);
         let (controller_state, u) = self.controller.step(&self.controller_state, &measurement, &goal);

@@ -1,5 +1,6 @@
 //! A scenario bound to an arm of `N` joints: vectors in place of lists, whole steps in place of times.
 
+use certune_control::GoalRateLimiter;
 use certune_dynamics::Payload;
 use certune_linsys::Joints;
 use nalgebra::Vector3;
@@ -69,6 +70,8 @@ pub struct Task<const N: usize> {
     pub segments: Vec<TaskSegment<N>>,
     /// Whether motor torques are limited.
     pub torque_limits: bool,
+    /// Moves the controller's goal from one goal to the next; it jumps when there is none.
+    pub goal_limiter: Option<GoalRateLimiter>,
     /// How the plant is integrated.
     pub integrator: Integrator,
     /// Sensor noise.

@@ -294,3 +294,33 @@ fn any_arm_has_a_generic_task() {
     let wrong: Result<Model<7>, _> = Model::new(&six);
     assert!(wrong.is_err());
 }
+
+#[test]
+fn a_limited_goal_moves_at_its_speed_from_the_start_and_the_figures_keep_the_tasks_goal() {
+    let speed = 0.4;
+    let (step_s, mut scenario) = (1e-3, hold(1.0));
+    let mut away = pose();
+    away[0] += 0.3;
+    away[3] -= 0.4; // half a radian: not reached within a second at 0.4 rad/s
+    let mut back = scenario.segments[0].clone();
+    scenario.segments[0].goal_rad = away.as_slice().to_vec();
+    back.duration_s = 2.0;
+    scenario.segments.push(back);
+    scenario.goal_speed_rad_per_s = Some(speed);
+    let (metrics, rows) = recorded(&nominal(true), &scenario, &Constant(Joints::zeros()));
+    assert_eq!(rows.len(), 3000);
+    let mut before = pose();
+    for (k, row) in rows.iter().enumerate() {
+        assert!((row.goal - before).norm() <= speed * step_s, "sample {k}");
+        before = row.goal;
+    }
+    // It moves from the first sample on, turns where it is when the next goal is set, and arrives to the bit.
+    assert!(((rows[0].goal - pose()).norm() - speed * step_s).abs() < 1e-10);
+    assert!(((rows[999].goal - pose()).norm() - 0.4).abs() < 1e-8);
+    assert!(((rows[1499].goal - pose()).norm() - 0.2).abs() < 1e-8);
+    assert_eq!(rows[2100].goal, pose());
+    assert_eq!(metrics.segments[0].goal_rad, away.as_slice());
+    // The arm rested at the start throughout: the error is the whole step, and ITAE that of a step (h^2 sum k, at each sample's end).
+    assert!((metrics.segments[0].final_error_rad[0] + 0.3).abs() < 1e-9);
+    assert!((metrics.segments[0].itae_rad_s2[0] - 0.15).abs() < 1e-3);
+}

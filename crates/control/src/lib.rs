@@ -6,6 +6,8 @@
 //! | model reference adaptive control (MRAC), three named laws | [`mrac`] | none | adaptive gains |
 //! | gravity-compensated PD, computed torque | [`baseline`] | handed in by the caller | nothing |
 //!
+//! A goal that jumps may be handed to any of them through a [`GoalRateLimiter`], which makes it a ramp.
+//!
 //! | symbol | code | meaning | unit |
 //! |--------|------|---------|------|
 //! | q, q̇  | [`Measurement::q`], [`Measurement::dq`] | measured position and velocity | rad, rad/s |
@@ -55,8 +57,10 @@
 pub mod aic;
 pub mod baseline;
 mod controller;
+mod goal;
 pub mod mrac;
 mod param;
 
 pub use controller::{Controller, Measurement};
+pub use goal::GoalRateLimiter;
 pub use param::{Expected, ParamError, Precision};

@@ -4,7 +4,7 @@ use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAss
 
 use certune_control::aic::{Aic, AicGains, AicParams};
 use certune_control::mrac::{Mrac, MracGains, MracLaw, MracParams};
-use certune_control::{Controller, Measurement};
+use certune_control::{Controller, GoalRateLimiter, Measurement};
 use certune_linsys::{Joints, Real};
 use num_traits::{One, Zero};
 
@@ -64,6 +64,10 @@ impl Real for Pair {
     }
     fn abs(self) -> Self {
         Self(self.0.map(f64::abs))
+    }
+    fn choose(self, bound: Self, then: Self, otherwise: Self) -> Self {
+        let lane = |k: usize| self.0[k].choose(bound.0[k], then.0[k], otherwise.0[k]);
+        Self([lane(0), lane(1)])
     }
     fn clamp_symmetric(self, limit: Self) -> Self {
         Self([self.0[0].clamp_symmetric(limit.0[0]), self.0[1].clamp_symmetric(limit.0[1])])
@@ -140,5 +144,21 @@ fn mrac_in_lanes() {
         };
         let params = MracParams::new(&gains, 1e-3).unwrap();
         assert_lanes_run_alone(&Mrac::<2>::new(&params), &Mrac::<2, Pair>::new(&params));
+    }
+}
+
+#[test]
+fn a_limited_goal_in_lanes() {
+    let limiter = GoalRateLimiter::new(0.3, 1e-3).unwrap();
+    // One lane arrives, the other is on its way, then holds.
+    let goals = [Joints::<2>::new(0.01, -0.02), Joints::<2>::new(-0.8, 0.1)];
+    let lost = Joints::<2>::new(f64::NAN, 0.0);
+    let mut alone = [Joints::<2>::zeros(); 2];
+    let mut lanes = bundle(alone);
+    for step in 0..200 {
+        let goals = if step < 150 { goals } else { [goals[0], lost] };
+        alone = [0, 1].map(|arm| limiter.step(&alone[arm], &goals[arm]));
+        lanes = limiter.step(&lanes, &bundle(goals));
+        assert_eq!(lanes, bundle(alone), "step {step}");
     }
 }

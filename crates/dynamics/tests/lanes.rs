@@ -76,6 +76,10 @@ impl Real for Pair {
     fn tanh(self) -> Self {
         self.map(f64::tanh)
     }
+    fn choose(self, bound: Self, then: Self, otherwise: Self) -> Self {
+        let lane = |k: usize| self.0[k].choose(bound.0[k], then.0[k], otherwise.0[k]);
+        Self([lane(0), lane(1)])
+    }
 }
 
 fn pair(a: &Joints<7>, b: &Joints<7>) -> Joints<7, Pair> {

@@ -9,8 +9,8 @@ use num_traits::{Float, One, Zero};
 /// A real number as the recursions see it: the four operations, a square root, an angle's sine and cosine.
 ///
 /// `f64` is the scalar of a single arm. A bundle of lanes, or a scalar that counts its operations, implements the same
-/// few functions and runs the same source: comparisons are therefore absent, and [`Real::clamp_symmetric`] and [`Real::abs`] stand for the
-/// only two decisions a control loop takes.
+/// few functions and runs the same source: comparisons are therefore absent, and [`Real::clamp_symmetric`], [`Real::abs`] and [`Real::choose`] stand
+/// for the only decisions a control loop takes.
 pub trait Real:
     nalgebra::Scalar
     + Copy
@@ -41,6 +41,8 @@ pub trait Real:
     fn clamp_symmetric(self, limit: Self) -> Self;
     /// The hyperbolic tangent.
     fn tanh(self) -> Self;
+    /// `then` where `self <= bound`, `otherwise` elsewhere; NaN on either side of the comparison gives `otherwise`.
+    fn choose(self, bound: Self, then: Self, otherwise: Self) -> Self;
 }
 
 impl Real for f64 {
@@ -73,6 +75,10 @@ impl Real for f64 {
     #[inline]
     fn tanh(self) -> Self {
         Float::tanh(self)
+    }
+    #[inline]
+    fn choose(self, bound: Self, then: Self, otherwise: Self) -> Self {
+        if self <= bound { then } else { otherwise }
     }
 }
 

@@ -239,7 +239,9 @@ pub struct Bands {
 pub struct SearchRecord {
     /// Every candidate, in order.
     pub evaluations: Vec<Evaluation>,
-    /// Cost of the published gains on the plants of the search.
+    /// Unit of the costs, empty when they have none; a search may be after another cost than the one that judges the held-out plants.
+    pub unit: String,
+    /// Cost of the published gains in the search.
     pub published_cost: Option<f64>,
 }
 
@@ -339,8 +341,8 @@ pub enum Grade {
 pub struct Assumption {
     /// In words, with its numbers.
     pub text: String,
-    /// Worth of its own evidence.
-    pub grade: Grade,
+    /// Worth of its own evidence; `None` for what the arm and the loop are taken to be, which is part of the statement.
+    pub grade: Option<Grade>,
 }
 
 /// One figure of merit of a claim.

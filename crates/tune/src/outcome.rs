@@ -96,20 +96,20 @@ impl Ord for Finite {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "rank", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Outcome {
-    /// Simulated on every plant of the batch, and a certificate holds.
+    /// A certificate holds (and it was simulated on every plant of the batch, when the objective is the settling cost).
     Certified {
-        /// Cost of the batch, s.
-        cost_s: Finite,
+        /// Cost, in the unit of the run's objective: s for the settling cost.
+        cost: Finite,
     },
     /// Simulated on every plant of the batch; nobody has tried to certify it.
     Simulated {
-        /// Cost of the batch, s.
-        cost_s: Finite,
+        /// Cost, in the unit of the run's objective: s for the settling cost.
+        cost: Finite,
     },
-    /// Simulated on every plant of the batch, but the certificate was refused.
+    /// Finished the task, or stable in the sample, but the certificate was refused.
     Uncertified {
-        /// Cost of the batch, s.
-        cost_s: Finite,
+        /// Cost as before; when the objective is a certified figure, the time constant of the slowest sampled mode, s.
+        cost: Finite,
     },
     /// Not simulated: a linearised loop of the sample grows.
     Unstable {
@@ -138,7 +138,7 @@ impl Outcome {
     /// An integer that increases as outcomes of one rank get worse.
     const fn key(self) -> u64 {
         match self {
-            Self::Certified { cost_s } | Self::Simulated { cost_s } | Self::Uncertified { cost_s } => cost_s.key(),
+            Self::Certified { cost } | Self::Simulated { cost } | Self::Uncertified { cost } => cost.key(),
             Self::Unstable { abscissa_per_s } => abscissa_per_s.key(),
             Self::Diverged { at_s } => !at_s.key(),
         }
@@ -149,12 +149,10 @@ impl Outcome {
         f64::from(self.rank()) + self.key() as f64 * KEY_UNIT
     }
 
-    /// The cost in s, for an outcome that has one.
-    pub const fn cost_s(self) -> Option<f64> {
+    /// The cost, for an outcome that has one.
+    pub const fn cost(self) -> Option<f64> {
         match self {
-            Self::Certified { cost_s } | Self::Simulated { cost_s } | Self::Uncertified { cost_s } => {
-                Some(cost_s.get())
-            }
+            Self::Certified { cost } | Self::Simulated { cost } | Self::Uncertified { cost } => Some(cost.get()),
             Self::Unstable { .. } | Self::Diverged { .. } => None,
         }
     }
@@ -195,9 +193,9 @@ mod tests {
 
     fn outcome() -> impl Strategy<Value = Outcome> {
         (0..5, number()).prop_map(|(rank, x)| match rank {
-            0 => Outcome::Certified { cost_s: x },
-            1 => Outcome::Simulated { cost_s: x },
-            2 => Outcome::Uncertified { cost_s: x },
+            0 => Outcome::Certified { cost: x },
+            1 => Outcome::Simulated { cost: x },
+            2 => Outcome::Uncertified { cost: x },
             3 => Outcome::Unstable { abscissa_per_s: x },
             _ => Outcome::Diverged { at_s: x },
         })
@@ -234,7 +232,7 @@ mod tests {
             let near = Finite::new(x).unwrap();
             let far = Finite::new(x * (1.0 + ratio)).unwrap();
             let pairs = [
-                [Outcome::Simulated { cost_s: near }, Outcome::Simulated { cost_s: far }],
+                [Outcome::Simulated { cost: near }, Outcome::Simulated { cost: far }],
                 [Outcome::Unstable { abscissa_per_s: near }, Outcome::Unstable { abscissa_per_s: far }],
                 [Outcome::Diverged { at_s: far }, Outcome::Diverged { at_s: near }],
             ];
@@ -250,7 +248,7 @@ mod tests {
         assert!(at(3.0) < at(1.0));
         assert!(Outcome::Unstable { abscissa_per_s: Finite::saturating(f64::NAN) } < at(30.0));
         assert!(
-            Outcome::Uncertified { cost_s: Finite::saturating(f64::INFINITY) }
+            Outcome::Uncertified { cost: Finite::saturating(f64::INFINITY) }
                 < Outcome::Unstable { abscissa_per_s: Finite::saturating(1e-9) }
         );
     }

@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use crate::gains::{Gain, Gains};
 use crate::outcome::Outcome;
 use crate::search::{Evaluation, SearchSettings, Termination};
-use crate::space::{Freedom, Space};
+use crate::space::{Freedom, ObjectiveName, Space};
 
 /// The version of the record that this crate writes.
-pub const RECORD_SCHEMA: u32 = 1;
+pub const RECORD_SCHEMA: u32 = 2;
 
 /// What was asked, in names and numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,6 +26,8 @@ pub struct Question {
     pub scenario: String,
     /// Names and versions of the programs and libraries that took part.
     pub versions: BTreeMap<String, String>,
+    /// What the search minimises or maximises.
+    pub objective: ObjectiveName,
     /// The search.
     pub search: SearchSettings,
     /// Plants on which every candidate is simulated.

@@ -82,7 +82,7 @@ pub fn of_run(metrics: &Metrics, start_rad: &[f64], step_s: f64) -> Outcome {
         sum_s += Parts::of(segment, previous, step_s).total_s();
         previous = &segment.goal_rad;
     }
-    Outcome::Simulated { cost_s: Finite::saturating(sum_s / metrics.segments.len().max(1) as f64) }
+    Outcome::Simulated { cost: Finite::saturating(sum_s / metrics.segments.len().max(1) as f64) }
 }
 
 /// The outcome of a batch: the mean cost of its worse half, rounded up; the worst outcome if a plant has no cost.
@@ -93,11 +93,11 @@ pub fn of_batch(plants: impl IntoIterator<Item = Outcome>) -> Outcome {
     outcomes.sort_unstable_by(|a, b| b.cmp(a));
     match outcomes.first() {
         None => Outcome::Diverged { at_s: Finite::saturating(0.0) },
-        Some(worst) if worst.cost_s().is_none() => *worst,
+        Some(worst) if worst.cost().is_none() => *worst,
         Some(_) => {
             let half = outcomes.len().div_ceil(2);
-            let sum_s: f64 = outcomes[..half].iter().filter_map(|outcome| outcome.cost_s()).sum();
-            Outcome::Simulated { cost_s: Finite::saturating(sum_s / half as f64) }
+            let sum_s: f64 = outcomes[..half].iter().filter_map(|outcome| outcome.cost()).sum();
+            Outcome::Simulated { cost: Finite::saturating(sum_s / half as f64) }
         }
     }
 }
@@ -149,7 +149,7 @@ mod tests {
     }
 
     fn cost_s(metrics: &Metrics) -> f64 {
-        of_run(metrics, &[0.0], 1e-3).cost_s().unwrap()
+        of_run(metrics, &[0.0], 1e-3).cost().unwrap()
     }
 
     #[test]
@@ -183,7 +183,7 @@ mod tests {
         let mut still = first_order(1.0);
         still.segments.truncate(1);
         still.segments[0].overshoot[0] = None;
-        let cost = of_run(&still, &[1.0], 1e-3).cost_s().unwrap();
+        let cost = of_run(&still, &[1.0], 1e-3).cost().unwrap();
         assert!((cost - (1.0_f64 / LEAST_STEP_RAD).sqrt()).abs() < 1e-12);
         assert_eq!(figures(&still).settling_time_s, None);
     }
@@ -200,7 +200,7 @@ mod tests {
     }
 
     fn simulated(cost_s: f64) -> Outcome {
-        Outcome::Simulated { cost_s: Finite::new(cost_s).unwrap() }
+        Outcome::Simulated { cost: Finite::new(cost_s).unwrap() }
     }
 
     #[test]
@@ -220,7 +220,7 @@ mod tests {
             prop_assert_eq!(forward, backward);
             let mean = costs.iter().sum::<f64>() / costs.len() as f64;
             let worst = costs.iter().copied().fold(0.0, f64::max);
-            let cost = forward.cost_s().unwrap();
+            let cost = forward.cost().unwrap();
             prop_assert!(cost >= mean - 1e-12 && cost <= worst + 1e-12);
         }
     }

@@ -1,7 +1,7 @@
 //! From a question to certified gains: search, certify, judge.
 //!
 //! 1. [`search`] ranks candidates by simulation; the start is among them.
-//! 2. The simulated candidates go before the certifier from the lowest cost upwards until one is certified. A candidate closer than
+//! 2. The candidates that finished the task, or met the objective otherwise, go before the certifier from the lowest cost upwards until one is certified. A candidate closer than
 //!    [`NEIGHBOUR`] in every coordinate to one that was refused is passed over: its certificate would fail for the same reason.
 //!    When the attempts are used up without a certificate, the start is tried last.
 //! 3. Start and winner run on plants that the search never saw, and each free gain of the winner is changed by ±10 %.
@@ -139,8 +139,9 @@ fn certify_best<C, R: Display>(
     progress: &dyn TuneProgress,
     mut certify: impl FnMut(&Gains) -> Result<C, R>,
 ) -> (Vec<Attempt>, Option<(usize, C)>) {
-    let simulated = |evaluation: &&Evaluation| matches!(evaluation.outcome, Outcome::Simulated { .. });
-    let queue: Vec<Evaluation> = run.ranked().into_iter().filter(simulated).copied().collect();
+    let hopeful =
+        |evaluation: &&Evaluation| matches!(evaluation.outcome, Outcome::Certified { .. } | Outcome::Simulated { .. });
+    let queue: Vec<Evaluation> = run.ranked().into_iter().filter(hopeful).copied().collect();
     let last_resort: Vec<Evaluation> =
         queue.iter().filter(|candidate| Some(candidate.index) == start).copied().collect();
     let mut visits: Vec<Attempt> = Vec::new();
@@ -155,16 +156,16 @@ fn certify_best<C, R: Display>(
             continue;
         }
         progress.stage(Stage::Certify { attempt: visits.len() + 1, candidate });
-        let Outcome::Simulated { cost_s } = candidate.outcome else { continue };
+        let (Outcome::Certified { cost } | Outcome::Simulated { cost }) = candidate.outcome else { continue };
         match certify(&candidate.gains) {
             Ok(certificate) => {
                 visits.push(Attempt { evaluation: candidate.index, refusal: None });
-                run.evaluations[candidate.index].outcome = Outcome::Certified { cost_s };
+                run.evaluations[candidate.index].outcome = Outcome::Certified { cost };
                 return (visits, Some((candidate.index, certificate)));
             }
             Err(reason) => {
                 visits.push(Attempt { evaluation: candidate.index, refusal: Some(reason.to_string()) });
-                run.evaluations[candidate.index].outcome = Outcome::Uncertified { cost_s };
+                run.evaluations[candidate.index].outcome = Outcome::Uncertified { cost };
                 refused.push(point);
             }
         }

@@ -8,8 +8,8 @@ use certune_control::aic::AicParams;
 use certune_dynamics::Robot;
 use certune_tune::filter::DEFAULT_SAMPLES;
 use certune_tune::{
-    AicObjective, Batch, BatchError, Bench, Gain, Gains, Judge, Method, Objective, Outcome, Question, SearchSettings,
-    Space, tune,
+    AicObjective, Batch, BatchError, Bench, Gain, Gains, Judge, Method, Objective, ObjectiveName, Outcome, Question,
+    SearchSettings, Space, tune,
 };
 
 const SCENARIO: &str = include_str!("../../../tuning/scenarios/pick-and-place.toml");
@@ -48,7 +48,7 @@ fn the_published_gains_settle_as_the_literature_says() {
         assert!((3.9..4.3).contains(&settling_time_s), "{settling_time_s}");
     }
     // A first-order lag that settles to 2 % in 4.05 s has a time constant of 1.04 s; jitter adds some hundredths.
-    let cost_s = verdict.outcome.cost_s().unwrap();
+    let cost_s = verdict.outcome.cost().unwrap();
     assert!((1.0..1.2).contains(&cost_s), "{cost_s}");
 }
 
@@ -64,7 +64,7 @@ fn what_the_filter_rejects_runs_away_or_never_settles() {
     let verdict = objective.batch().judge(&restless);
     let settles = |figures: &certune_tune::Figures| figures.settling_time_s.is_some();
     assert!(
-        verdict.plants.iter().all(|plant| plant.outcome.cost_s().is_none() || !settles(&plant.figures)),
+        verdict.plants.iter().all(|plant| plant.outcome.cost().is_none() || !settles(&plant.figures)),
         "{verdict:?}"
     );
 }
@@ -122,6 +122,7 @@ fn run(method: Method, threads: usize) -> certune_tune::RunRecord {
         robot_sha256: robot.sha256(),
         scenario: scenario.name.clone(),
         versions: BTreeMap::new(),
+        objective: ObjectiveName::SettlingCost,
         search: SearchSettings { particles: 6, ..SearchSettings::new(method, 24, 5) },
         batch_plants: 2,
         held_out_plants: 3,
@@ -139,7 +140,7 @@ fn run(method: Method, threads: usize) -> certune_tune::RunRecord {
 fn nelder_mead_beats_the_published_gains_on_plants_it_never_met_and_threads_do_not_matter() {
     let one = run(Method::NelderMead, 1);
     let (start, tuned) = (one.held_out.start.as_ref().unwrap(), one.held_out.tuned.as_ref().unwrap());
-    assert!(tuned.outcome.cost_s().unwrap() < 0.97 * start.outcome.cost_s().unwrap(), "{start:?} {tuned:?}");
+    assert!(tuned.outcome.cost().unwrap() < 0.97 * start.outcome.cost().unwrap(), "{start:?} {tuned:?}");
     let text = |record| serde_json::to_string_pretty(record).unwrap();
     assert_eq!(text(&one), text(&run(Method::NelderMead, 2)));
 }

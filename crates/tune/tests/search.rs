@@ -29,7 +29,7 @@ fn ones() -> Gains {
 }
 
 fn simulated(cost_s: f64) -> Outcome {
-    Outcome::Simulated { cost_s: Finite::saturating(cost_s) }
+    Outcome::Simulated { cost: Finite::saturating(cost_s) }
 }
 
 /// Squared distance, in natural logarithms, to a point that is far from the start in every gain.
@@ -62,7 +62,7 @@ fn cliff(gains: &Gains) -> Outcome {
 }
 
 fn cost_s(evaluation: &Evaluation) -> f64 {
-    evaluation.outcome.cost_s().expect("a simulated outcome")
+    evaluation.outcome.cost().expect("a simulated outcome")
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn nelder_mead_follows_rosenbrocks_valley() {
 fn nelder_mead_walks_along_a_cliff_without_falling() {
     let settings = SearchSettings::new(Method::NelderMead, 400, 0);
     let run = search(&space(5), Some(&ones()), &settings, &cliff, &()).unwrap();
-    assert!(run.evaluations.iter().any(|evaluation| evaluation.outcome.cost_s().is_none()), "the cliff was never met");
+    assert!(run.evaluations.iter().any(|evaluation| evaluation.outcome.cost().is_none()), "the cliff was never met");
     assert!(cost_s(run.ranked()[0]) < 1e-3, "{:?}", run.ranked()[0]);
 }
 

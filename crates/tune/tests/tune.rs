@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use certune_tune::{
-    Bench, Evaluation, Finite, Freedom, Gain, Gains, Judge, Method, Outcome, Progress, Question, Range, RunRecord,
-    Scale, SearchSettings, Space, Stage, TuneError, TuneProgress, Tuned, Verdict, tune,
+    Bench, Evaluation, Finite, Freedom, Gain, Gains, Judge, Method, ObjectiveName, Outcome, Progress, Question, Range,
+    RunRecord, Scale, SearchSettings, Space, Stage, TuneError, TuneProgress, Tuned, Verdict, tune,
 };
 
 fn space() -> Space {
@@ -35,14 +35,14 @@ fn objective(gains: &Gains) -> Outcome {
     if gains.kappa_a > 3.0 {
         return Outcome::Unstable { abscissa_per_s: Finite::saturating(gains.kappa_a) };
     }
-    Outcome::Simulated { cost_s: Finite::saturating(cost_s(gains)) }
+    Outcome::Simulated { cost: Finite::saturating(cost_s(gains)) }
 }
 
 struct Held;
 
 impl Judge for Held {
     fn judge(&self, gains: &Gains) -> Verdict {
-        Verdict { outcome: Outcome::Simulated { cost_s: Finite::saturating(1.1 * cost_s(gains)) }, plants: Vec::new() }
+        Verdict { outcome: Outcome::Simulated { cost: Finite::saturating(1.1 * cost_s(gains)) }, plants: Vec::new() }
     }
 }
 
@@ -52,6 +52,7 @@ fn question(method: Method, attempts: usize) -> Question {
         robot_sha256: "00".to_owned(),
         scenario: "pick-and-place".to_owned(),
         versions: BTreeMap::from([("autotune".to_owned(), "0.1.0".to_owned())]),
+        objective: ObjectiveName::SettlingCost,
         search: SearchSettings::new(method, 60, 3),
         batch_plants: 1,
         held_out_plants: 1,
@@ -106,7 +107,7 @@ fn the_best_certified_candidate_wins_over_better_refused_ones() {
     rank_is_consistent(&tuned.record);
     let winner = tuned.record.winner().unwrap();
     assert!(winner.gains.kappa_mu < 2.0 && tuned.record.certification.len() > 1);
-    let better = |other: &&Evaluation| other.outcome.cost_s() < winner.outcome.cost_s() && other.gains.kappa_mu < 2.0;
+    let better = |other: &&Evaluation| other.outcome.cost() < winner.outcome.cost() && other.gains.kappa_mu < 2.0;
     assert!(tuned.record.evaluations.iter().find(better).is_none(), "a better candidate would have been certified");
 }
 
@@ -118,7 +119,7 @@ fn near_neighbours_of_a_refused_candidate_are_passed_over() {
         Err::<(), _>("never")
     });
     rank_is_consistent(&tuned.record);
-    let simulated = tuned.record.evaluations.iter().filter(|evaluation| evaluation.outcome.cost_s().is_some()).count();
+    let simulated = tuned.record.evaluations.iter().filter(|evaluation| evaluation.outcome.cost().is_some()).count();
     let points: Vec<_> = visited.into_inner().unwrap().iter().map(|gains| space().encode(gains)).collect();
     assert!(points.len() < simulated, "a converging simplex has neighbours");
     let (last, earlier) = points.split_last().unwrap();

@@ -27,9 +27,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::Flaw;
 use crate::number::{Number, positive};
+use crate::quantity::{require, require_length};
 
 /// States of one joint's controller: e, m, mu', mu'', u~.
-pub(crate) const STATES: usize = 5;
+pub const STATES: usize = 5;
 
 /// Gains as written: one number per joint, base to tip.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -77,38 +78,52 @@ impl AicGains {
     /// # Errors
     /// [`Flaw`] when a list has the wrong length, a gain is not positive, or joints differ.
     pub(crate) fn shared(&self, joints: usize) -> Result<SharedGains, Flaw> {
-        let mut values = Vec::with_capacity(7);
         for (gain, list) in self.named() {
-            if list.len() != joints {
-                return Err(Flaw::Length { quantity: gain, found: list.len(), expected: joints });
-            }
-            let Some(first) = list.first() else {
-                return Err(Flaw::Length { quantity: gain, found: 0, expected: joints });
-            };
-            if let Some(bad) = list.iter().find(|x| !positive(x.value())) {
-                return Err(Flaw::Quantity { quantity: gain, value: bad.to_string(), expected: "a positive number" });
-            }
-            if list.iter().any(|x| x.value() != first.value()) {
+            require_length(gain, list.len(), joints)?;
+            if list.iter().any(|x| Some(x.value()) != list.first().map(Number::value)) {
                 return Err(Flaw::UnequalGains { gain });
             }
-            values.push(first.value().clone());
         }
-        let [kappa_mu, kappa_a, sigma_q, sigma_dq, sigma_mu, sigma_dmu, time_constant] = &values[..] else {
-            return Err(Flaw::Length { quantity: "gains", found: values.len(), expected: 7 });
+        self.of_joint(0)
+    }
+
+    /// The weights of one joint's equations, joints counted from 0.
+    ///
+    /// # Errors
+    /// [`Flaw`] when a list ends before that joint or the joint's gain is not positive.
+    pub(crate) fn of_joint(&self, joint: usize) -> Result<SharedGains, Flaw> {
+        let value = |gain, list: &[Number]| {
+            let Some(number) = list.get(joint) else {
+                return Err(Flaw::Length { quantity: gain, found: list.len(), expected: joint + 1 });
+            };
+            require(gain, number, positive(number.value()), "a positive number")?;
+            Ok(number.value().clone())
         };
+        let kappa_mu = value("kappa_mu", &self.kappa_mu)?;
+        let kappa_a = value("kappa_a", &self.kappa_a)?;
+        let sigma_q = value("sigma_q", &self.sigma_q)?;
+        let sigma_dq = value("sigma_dq", &self.sigma_dq)?;
         Ok(SharedGains {
-            a: kappa_mu / sigma_q,
-            av: kappa_mu / sigma_dq,
-            b: kappa_mu / sigma_mu,
-            c: kappa_mu / sigma_dmu,
-            torque_per_position: kappa_a / sigma_q,
-            torque_per_velocity: kappa_a / sigma_dq,
-            time_constant: time_constant.clone(),
+            a: &kappa_mu / &sigma_q,
+            av: &kappa_mu / &sigma_dq,
+            b: &kappa_mu / value("sigma_mu", &self.sigma_mu)?,
+            c: &kappa_mu / value("sigma_dmu", &self.sigma_dmu)?,
+            torque_per_position: &kappa_a / sigma_q,
+            torque_per_velocity: &kappa_a / sigma_dq,
+            time_constant: value("reference_time_constant_s", &self.reference_time_constant_s)?,
         })
+    }
+
+    /// `z' = A z + B dq` of one joint, joints counted from 0.
+    ///
+    /// # Errors
+    /// [`Flaw`] when a list ends before that joint or the joint's gain is not positive.
+    pub fn controller(&self, joint: usize) -> Result<Controller<BigRational>, Flaw> {
+        Ok(self.of_joint(joint)?.matrices())
     }
 }
 
-/// The weights of the controller's equations when all joints have the same gains.
+/// The weights of the controller's equations of one joint, or of every joint when all have the same gains.
 #[derive(Clone, Debug)]
 pub(crate) struct SharedGains {
     a: BigRational,
@@ -121,17 +136,27 @@ pub(crate) struct SharedGains {
 }
 
 /// `z' = A z + B dq` of one joint; the torque is the last state.
-pub(crate) struct ControllerMatrices {
-    pub(crate) a: [[BigRational; STATES]; STATES],
-    pub(crate) b: [BigRational; STATES],
+#[derive(Clone, Debug, PartialEq)]
+pub struct Controller<T> {
+    /// A, row by row.
+    pub a: [[T; STATES]; STATES],
+    /// B.
+    pub b: [T; STATES],
+}
+
+impl<T> Controller<T> {
+    /// The matrices over another field.
+    pub fn map<S>(&self, convert: impl Fn(&T) -> S) -> Controller<S> {
+        Controller { a: self.a.each_ref().map(|row| row.each_ref().map(&convert)), b: self.b.each_ref().map(&convert) }
+    }
 }
 
 impl SharedGains {
-    pub(crate) fn matrices(&self) -> ControllerMatrices {
+    pub(crate) fn matrices(&self) -> Controller<BigRational> {
         let Self { a, av, b, c, torque_per_position, torque_per_velocity, time_constant: t } = self;
         let zero = BigRational::zero;
         let one = BigRational::one();
-        ControllerMatrices {
+        Controller {
             a: [
                 [zero(), zero(), zero(), zero(), zero()],
                 [a.clone(), -a - b / (t * t), &one - b / t, zero(), zero()],
@@ -142,4 +167,38 @@ impl SharedGains {
             b: [one, zero(), av.clone(), zero(), -torque_per_velocity],
         }
     }
+
+    /// One sampling step of length h: `x+ = F x + G y`, `x = (m, mu', mu'', u~)`, `y = (e, dq)`; the torque that follows is `u~+`.
+    ///
+    /// The beliefs take an Euler step from the old beliefs and the new measurement; the torque then descends with the beliefs just updated.
+    pub(crate) fn sampled(&self, h: &BigRational) -> SampledMatrices {
+        const BELIEFS: usize = 3;
+        let Controller { a, b } = self.matrices();
+        let mut f: [[BigRational; 4]; 4] = Default::default();
+        let mut g: [[BigRational; 2]; 4] = Default::default();
+        for i in 0..BELIEFS {
+            for j in 0..BELIEFS {
+                f[i][j] = h * &a[i + 1][j + 1];
+            }
+            f[i][i] += BigRational::one();
+            g[i] = [h * &a[i + 1][0], h * &b[i + 1]];
+        }
+        // u~+ = u~ + h (a_40 e + b_4 dq + a_41 m+ + a_42 mu'+).
+        let [of_e, of_m, of_dmu, ..] = &a[BELIEFS + 1];
+        let chained = |m: &BigRational, dmu: &BigRational| h * (of_m * m + of_dmu * dmu);
+        for j in 0..BELIEFS {
+            f[BELIEFS][j] = chained(&f[0][j], &f[1][j]);
+        }
+        f[BELIEFS][BELIEFS] = BigRational::one();
+        for (j, direct) in [of_e, &b[BELIEFS + 1]].into_iter().enumerate() {
+            g[BELIEFS][j] = chained(&g[0][j], &g[1][j]) + h * direct;
+        }
+        SampledMatrices { f, g }
+    }
+}
+
+/// `x+ = F x + G y` of one joint; the torque is the last state.
+pub(crate) struct SampledMatrices {
+    pub(crate) f: [[BigRational; 4]; 4],
+    pub(crate) g: [[BigRational; 2]; 4],
 }

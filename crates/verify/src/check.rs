@@ -3,9 +3,10 @@
 use num_rational::BigRational;
 use sha2::{Digest, Sha256};
 
-use crate::claims::{ClaimKind, Inequality, Verdict};
-use crate::document::{Arm, ArmRanges, Bounds, ConfigurationSet, Document, Entry, Evidence, Grade};
+use crate::claims::{Claim, ClaimKind, Inequality, Verdict};
+use crate::document::{Arm, ArmRanges, Bounds, ConfigurationSet, Document, Entry, Evidence, Grade, InertiaEnclosure};
 use crate::error::{Flaw, Rejection, VerifyError};
+use crate::number::positive;
 use crate::quantity::{
     require, require_at_least_zero, require_interval, require_length, require_plain, require_positive, require_sha256,
 };
@@ -220,6 +221,9 @@ pub(crate) fn check_bounds(arm: &Arm, arms: &ArmRanges, over: &ConfigurationSet,
             require("diagonal_kg_m2", upper, rotor <= upper.value(), too_small)?;
         }
     }
+    if let Some(inertia) = &bounds.inertia {
+        check_inertia(arm, inertia)?;
+    }
     if let Some(torques) = &bounds.gravity_torque_n_m {
         require_length("gravity_torque_n_m", torques.len(), arm.joints)?;
         for torque in torques {
@@ -227,6 +231,31 @@ pub(crate) fn check_bounds(arm: &Arm, arms: &ArmRanges, over: &ConfigurationSet,
         }
     }
     Ok(())
+}
+
+fn check_inertia(arm: &Arm, inertia: &InertiaEnclosure) -> Result<(), Flaw> {
+    for matrix in [&inertia.midpoint_kg_m2, &inertia.radius_kg_m2] {
+        require_length("inertia", matrix.len(), arm.joints)?;
+        for row in matrix {
+            require_length("inertia", row.len(), arm.joints)?;
+        }
+        for (i, row) in matrix.iter().enumerate() {
+            for (j, entry) in row.iter().enumerate() {
+                require_plain("inertia", entry)?;
+                require("inertia", entry, entry.value() == matrix[j][i].value(), "a symmetric matrix")?;
+            }
+        }
+    }
+    for radius in inertia.radius_kg_m2.iter().flatten() {
+        require_at_least_zero("radius_kg_m2", radius)?;
+    }
+    // The diagonal of an inertia matrix is positive: an enclosure below 0 would be of no arm at all.
+    for joint in 0..arm.joints {
+        let (middle, radius) = (&inertia.midpoint_kg_m2[joint][joint], &inertia.radius_kg_m2[joint][joint]);
+        let largest = middle.value() + radius.value();
+        require("midpoint_kg_m2", middle, positive(&largest), "an enclosure that some inertia matrix is in")?;
+    }
+    require_at_least_zero("coriolis_kg_m2", &inertia.coriolis_kg_m2)
 }
 
 fn check_evidence(document: &Document, records: &[Record]) -> Result<(), Rejection> {
@@ -247,6 +276,16 @@ fn check_evidence(document: &Document, records: &[Record]) -> Result<(), Rejecti
             record.supports(document).map_err(|reason| Rejection::Record { reason: reason.to_owned() })
         }
     }
+}
+
+/// Checks the proof of one claim about a document on its own: what a search asks before it writes the claim down.
+///
+/// Neither the document's head nor its evidence is checked; only [`verify`] makes a [`Certificate`].
+///
+/// # Errors
+/// [`Flaw`] where the proof fails.
+pub fn checked_alone(document: &Document, claim: &Claim) -> Result<Vec<Inequality>, Flaw> {
+    claim.provable().prove(document, document.claims.len())
 }
 
 fn check_entry(document: &Document, position: usize, entry: &Entry) -> Result<Checked, Rejection> {

@@ -126,6 +126,21 @@ pub struct Bounds {
     pub diagonal_kg_m2: Option<[Vec<Number>; 2]>,
     /// Largest gravity torque of each joint, N m.
     pub gravity_torque_n_m: Option<Vec<Number>>,
+    /// The inertia matrix entry by entry, over a small box.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub inertia: Option<InertiaEnclosure>,
+}
+
+/// `|M_ij(q) - midpoint_ij| <= radius_ij`, and `|x'C(q, v) y| <= coriolis |x||v||y|` for the Coriolis matrix in Christoffel form.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InertiaEnclosure {
+    /// Symmetric, kg m^2.
+    pub midpoint_kg_m2: Vec<Vec<Number>>,
+    /// Symmetric, not negative, kg m^2.
+    pub radius_kg_m2: Vec<Vec<Number>>,
+    /// kg m^2.
+    pub coriolis_kg_m2: Number,
 }
 
 /// What a set of constants rests on.

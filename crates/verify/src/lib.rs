@@ -9,9 +9,14 @@
 //! |---|---|
 //! | `number` | decimals and dyadics as written, and the rational numbers they are |
 //! | `quantity` | what a number must be before anything is derived from it |
-//! | `algebra` | characteristic polynomial, Hurwitz determinants, Sturm sequences, LDL' |
+//! | `outward` | square roots and exponentials rounded to the safe side |
+//! | `algebra` | characteristic polynomial, Hurwitz determinants, LDL' |
+//! | `polytope` | whether every polynomial of a box of them is stable |
+//! | `sampled_loops` | the polynomials of the loops with a sampled controller and a delayed torque |
 //! | `form` | quadratic forms assembled from linear ones |
 //! | `aic`, `gains` | the controllers' gains, and the AIC's matrices |
+//! | `normed` | what a claim may rest on when an earlier one proves a region |
+//! | `mrac` | what the proofs about the adaptive controller need of its gains |
 //! | `claims` | one file for each kind of claim: what it states, its words, its proof |
 //! | `document` | the file |
 //! | `record` | proved constants of an arm, referred to by their hash |
@@ -29,21 +34,27 @@ mod document;
 mod error;
 mod form;
 mod gains;
+mod mrac;
+mod normed;
 mod number;
+mod outward;
+mod polytope;
 mod quantity;
 mod record;
+mod sampled_loops;
 mod statement;
 
-pub use aic::AicGains;
-pub use check::{Certificate, Checked, seal, verify};
-pub use claims::{
-    Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, Figure, Inequality, LoopBox, LoopFamily, NotProvedClaim,
-    Reason, RefusedClaim, RegionClaim, RegionWitness, Verdict, family_box, region_inequalities,
+pub use aic::{AicGains, Controller, STATES};
+pub use check::{Certificate, Checked, checked_alone, seal, verify};
+pub use claims::*;
+pub use document::{
+    Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade, InertiaEnclosure,
 };
-pub use document::{Arm, ArmRanges, Bounds, ConfigurationSet, Constants, Document, Entry, Evidence, Family, Grade};
 pub use error::{Flaw, Rejection, VerifyError};
 pub use form::{Field, Form, Row};
 pub use gains::{Gains, MracGains, MracLaw};
+pub use normed::{Norm, region_norm};
 pub use number::{Number, NumberError};
 pub use record::{BoundProof, Record};
+pub use sampled_loops::{MOST_DELAY_SAMPLES, PlantStep, SampledFamily};
 pub use statement::Assumption;

@@ -134,6 +134,10 @@ impl Record {
             (Some(_), None) => false,
             (Some(ours), Some(theirs)) => every(ours, theirs),
         };
+        let inertia = match (&ours.inertia, &theirs.inertia) {
+            (None, _) => true,
+            (Some(ours), theirs) => theirs.as_ref().is_some_and(|theirs| ours == theirs),
+        };
         let all = at_least(&theirs.m_lo_kg_m2, &ours.m_lo_kg_m2)
             && at_least(&ours.m_hi_kg_m2, &theirs.m_hi_kg_m2)
             && at_least(&ours.k_g_n_m_per_rad, &theirs.k_g_n_m_per_rad)
@@ -141,7 +145,8 @@ impl Record {
             && optional(&ours.k_r, &theirs.k_r)
             && optional(&ours.k_m, &theirs.k_m)
             && diagonal
-            && torque;
+            && torque
+            && inertia;
         if all { Ok(()) } else { Err("a constant is tighter than what was proved") }
     }
 }

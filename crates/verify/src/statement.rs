@@ -33,8 +33,13 @@ pub(crate) fn per_joint(texts: &[String]) -> String {
 pub(crate) fn list(numbers: &[Number]) -> String {
     match numbers {
         [first, rest @ ..] if rest.iter().all(|x| x.value() == first.value()) => first.to_string(),
-        _ => format!("[{}]", numbers.iter().map(Number::to_string).collect::<Vec<_>>().join(", ")),
+        _ => format!("[{}]", each(numbers)),
     }
+}
+
+/// Every number, with commas between.
+pub(crate) fn each(numbers: &[Number]) -> String {
+    numbers.iter().map(Number::to_string).collect::<Vec<_>>().join(", ")
 }
 
 /// Arm, gains, family and constants: what every statement of the document is about.
@@ -109,6 +114,17 @@ fn bounds(c: &Bounds) -> String {
     }
     if let Some([lower, upper]) = &c.diagonal_kg_m2 {
         let _ = write!(text, "; M at least diag({}) and at most diag({}) kg m^2", list(lower), list(upper));
+    }
+    if let Some(inertia) = &c.inertia {
+        let rows =
+            |matrix: &[Vec<Number>]| matrix.iter().map(|row| format!("[{}]", each(row))).collect::<Vec<_>>().join(", ");
+        let _ = write!(
+            text,
+            "; M within [{}] of [{}] kg m^2, entry by entry, and |x'C(q, v) y| at most {} |x||v||y| (kg m^2)",
+            rows(&inertia.radius_kg_m2),
+            rows(&inertia.midpoint_kg_m2),
+            inertia.coriolis_kg_m2
+        );
     }
     if let Some(torques) = &c.gravity_torque_n_m {
         let _ = write!(text, "; gravity torques at most {} N m", list(torques));

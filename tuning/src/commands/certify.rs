@@ -1,22 +1,26 @@
 //! `autotune certify`: claims about given gains on a family of plants.
 
-use certune::certify::{Claims, FamilyValues};
-use certune::closed_loop::PlantBox;
+use certune::certify::GoalListValues;
+use certune::closed_loop::{Gains, LawName, PlantBox, Scenario};
 use certune::dynamics::{Link, Robot, for_joint_count};
-use certune::verify::Certificate;
-use certune::{ArmCertifier, certificate_text, family_of};
+use certune::verify::{Certificate, Evidence, Record};
+use certune::{Answer, ArmCertifier, ArmGains, Growth, Over, Request, certificate_text, family_of};
 use serde::Serialize;
 
-use super::claims::{AssumptionSummary, ClaimSummary, claims_in_words, summaries};
+use super::claims::{AssumptionSummary, ClaimSummary, claims_in_words, growths, summaries};
 use super::verify::exit_of;
 use crate::catalogue::{self, GainsSource};
-use crate::cli::{CertifyArgs, ClaimName, Context, Exit, Switch};
+use crate::cli::{CertifyArgs, Context, Exit, OverName, Switch};
 use crate::error::Error;
 use crate::output;
 use crate::progress::Terminal;
+use crate::values::Numbers;
 
-/// The controller's step for the check of the gains, s; the claims are in continuous time.
+/// The controller's step, s: that of the sampled claims and of the check of the gains.
 const STEP_S: f64 = 1e-3;
+
+/// Room around a scenario's poses in the box of `--over scenario`, rad.
+const ROOM_RAD: f64 = 0.3;
 
 #[derive(Debug, Serialize)]
 struct Summary {
@@ -27,6 +31,8 @@ struct Summary {
     about: String,
     claims: Vec<ClaimSummary>,
     assumptions: Vec<AssumptionSummary>,
+    /// Hash of the record whose proved constants the claims rest on; none when the constants were sampled.
+    constants_sha256: Option<String>,
     sha256: String,
     /// Where the certificate was written to.
     file: Option<String>,
@@ -35,7 +41,7 @@ struct Summary {
 pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
     let robot = catalogue::robot(&args.robot.robot, args.robot.tip.as_deref())?;
     let gains = GainsSource::find(&args.gains)?;
-    gains.aic("certify")?;
+    let records = catalogue::records(&args.constants)?;
     let (plant_box, beyond) = match &args.scenario {
         Some(given) => {
             let scenario = catalogue::scenario(Some(given), &robot)?;
@@ -43,12 +49,19 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
         }
         None => (plant_box(args, &robot), None),
     };
-    let family = family_of(&plant_box)?;
-    let certificate =
-        for_joint_count!(robot.joints(), N => certificate::<N>(&robot, &gains, &family, args.claim, context))
-            .unwrap_or_else(|| Err(catalogue::too_many_joints(&robot)))?;
+    let over = over(args, &robot)?;
+    let Certified { certificate, growth, unknown_records } = for_joint_count!(robot.joints(), N => {
+        certificate::<N>(args, &robot, &gains, &plant_box, (&records, &over), context)
+    })
+    .unwrap_or_else(|| Err(catalogue::too_many_joints(&robot)))?;
+    let mut companions = Vec::new();
     if let Some(path) = &args.out {
         output::write_file(path, &certificate_text(&certificate)?)?;
+        for record in &unknown_records {
+            let beside = path.with_extension("constants.json");
+            output::write_file(&beside, &(serde_json::to_string_pretty(record)? + "\n"))?;
+            companions.push(beside);
+        }
     }
     if context.json {
         output::print_json(&Summary {
@@ -56,18 +69,27 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
             gains: args.gains.clone(),
             family: plant_box,
             about: certificate.document().about.clone(),
-            claims: summaries(&certificate),
+            claims: summaries(&certificate, &growth),
             assumptions: certificate.assumptions().into_iter().map(Into::into).collect(),
+            constants_sha256: match &certificate.document().constants.evidence {
+                Evidence::Proved { record_sha256 } => Some(record_sha256.clone()),
+                Evidence::Sampled { .. } => None,
+            },
             sha256: certificate.document().sha256.clone(),
             file: args.out.as_ref().map(|path| path.display().to_string()),
         })?;
     } else {
-        let mut text = claims_in_words(&certificate, context.verbose);
+        let mut text = claims_in_words(&certificate, &growth, context.verbose);
+        if let Some(note) = released_code(&gains) {
+            text.push_str(&output::wrapped(note, 0));
+        }
         if let Some(note) = beyond {
             text.push_str(&output::wrapped(&note, 0));
         }
         if let Some(path) = &args.out {
-            text.push_str(&format!("written to {}; check it with `autotune verify {0}`\n", path.display()));
+            let constants =
+                companions.iter().map(|path| format!(" --constants {}", path.display())).collect::<String>();
+            text.push_str(&format!("written to {}; check it with `autotune verify {0}{constants}`\n", path.display()));
         }
         output::print(&text)?;
     }
@@ -94,32 +116,123 @@ fn plant_box(args: &CertifyArgs, robot: &Robot) -> PlantBox {
     }
 }
 
+/// What a certificate took, and what goes with it.
+struct Certified {
+    certificate: Certificate,
+    growth: Vec<Option<Growth>>,
+    /// Records made for this certificate: they must be kept with it.
+    unknown_records: Vec<Record>,
+}
+
+/// What else could be asked about gains whose law no claim covers.
+fn released_code(gains: &GainsSource) -> Option<&'static str> {
+    match &gains.gains.gains {
+        Gains::Mrac(table) if table.law == LawName::ReleasedCode => Some(
+            "Note: the same gains under the paper's equations are another controller, which claims do cover: a gains file with law = \
+             \"reference-model\" or \"raw-goal\".",
+        ),
+        Gains::Mrac(_) | Gains::Aic(_) => None,
+    }
+}
+
+/// The configuration of claims about one.
+fn at<const N: usize>(args: &CertifyArgs, robot: &Robot) -> Result<Vec<f64>, Error> {
+    match &args.at {
+        Some(Numbers(found)) if found.len() != N => {
+            Err(Error::ListLength { flag: "--at", found: found.len(), robot: robot.name().to_owned(), joints: N })
+        }
+        Some(Numbers(at)) => Ok(at.clone()),
+        None => {
+            let scenario = catalogue::scenario(args.scenario.as_deref(), robot)?;
+            Ok(scenario.segments.first().map_or(scenario.start_rad, |segment| segment.goal_rad.clone()))
+        }
+    }
+}
+
+/// The goals of a scenario, one after the other.
+fn goals(scenario: Scenario) -> GoalListValues {
+    let goals = scenario.segments.into_iter().map(|segment| (segment.goal_rad, segment.duration_s)).collect();
+    GoalListValues { start_rad: scenario.start_rad, goals }
+}
+
+/// The configurations that the options speak of.
+pub fn over(args: &CertifyArgs, robot: &Robot) -> Result<Over, Error> {
+    Ok(match args.over {
+        None | Some(OverName::Torus) => Over::AllAngles,
+        Some(OverName::Range) => Over::JointRange,
+        Some(OverName::Scenario) => around(&catalogue::scenario(args.scenario.as_deref(), robot)?, robot),
+    })
+}
+
+/// The smallest box that holds the scenario's start and goals, wider by [`ROOM_RAD`] on every side but not beyond the joints' end stops.
+fn around(scenario: &Scenario, robot: &Robot) -> Over {
+    let poses = || scenario.segments.iter().map(|segment| &segment.goal_rad).chain([&scenario.start_rad]);
+    let ends = |joint: usize| {
+        let angles = || poses().map(move |pose| pose[joint]);
+        let limits = robot.links()[joint].limits;
+        let lower = (angles().fold(f64::INFINITY, f64::min) - ROOM_RAD).max(limits.lower_rad);
+        let upper = (angles().fold(f64::NEG_INFINITY, f64::max) + ROOM_RAD).min(limits.upper_rad);
+        (lower, upper)
+    };
+    let (lower_rad, upper_rad) = (0..robot.joints()).map(ends).unzip();
+    Over::Box { lower_rad, upper_rad }
+}
+
 fn certificate<const N: usize>(
+    args: &CertifyArgs,
     robot: &Robot,
-    gains: &GainsSource,
-    family: &FamilyValues,
-    claim: ClaimName,
+    source: &GainsSource,
+    plant_box: &PlantBox,
+    (records, over): (&[Record], &Over),
     context: Context,
-) -> Result<Certificate, Error> {
-    let table = gains.aic("certify")?;
-    let gains = gains.aic_gains::<N>(table, STEP_S)?;
-    let claims = match claim {
-        ClaimName::Exponential => Claims::Exponential,
-        ClaimName::Region => Claims::Region,
-        ClaimName::All => Claims::All,
+) -> Result<Certified, Error> {
+    let gains: ArmGains<N> = match &source.gains.gains {
+        Gains::Aic(table) => source.aic_gains::<N>(table, STEP_S)?.into(),
+        Gains::Mrac(table) => (*source.mrac_params::<N>(table, STEP_S)?.gains()).into(),
+    };
+    let request = Request {
+        claims: args.claims.clone(),
+        delay_samples: args.delay,
+        torque_limits: args.torque_limits.unwrap_or_default(),
+        at_rad: Some(at::<N>(args, robot)?),
+        goals: args
+            .scenario
+            .is_some()
+            .then(|| catalogue::scenario(args.scenario.as_deref(), robot))
+            .transpose()?
+            .map(goals),
+        ..Request::default()
     };
     let progress = Terminal::new(context.verbose);
-    progress.begin("sampling the arm's constants");
-    let certifier = ArmCertifier::<N>::new(robot, family)?;
-    let constants = &certifier.constants().constants;
-    progress.detail(|| {
-        format!(
-            "          m_lo {:.4} kg m², m_hi {:.3} kg m², k_g {:.2} N m/rad, k_c {:.3} kg m², k_r {:.2}",
-            constants.m_lo_kg_m2, constants.m_hi_kg_m2, constants.k_g_n_m_per_rad, constants.k_c_kg_m2, constants.k_r
-        )
-    });
+    let certifier = ArmCertifier::<N>::new(robot, &family_of(plant_box)?)?.with_records(records, over)?;
+    match certifier.record() {
+        Some(record) => progress.detail(|| format!("          proved constants: record {}", record.sha256)),
+        None => {
+            progress.begin("sampling the arm's constants");
+            let constants = certifier.constants().constants;
+            progress.detail(|| {
+                format!(
+                    "          m_lo {:.4} kg m², m_hi {:.3} kg m², k_g {:.2} N m/rad, k_c {:.3} kg m², k_r {:.2}",
+                    constants.m_lo_kg_m2,
+                    constants.m_hi_kg_m2,
+                    constants.k_g_n_m_per_rad,
+                    constants.k_c_kg_m2,
+                    constants.k_r
+                )
+            });
+        }
+    }
     progress.begin("searching for proofs");
-    let certificate = certifier.certify(&gains, claims);
+    let answer =
+        certifier.answer(&gains, &request).map_err(Error::from).and_then(|Answer { certificate, records: used }| {
+            let growth = growths::<N>(robot, &certificate)?;
+            let known = |record: &Record| records.iter().any(|known| known.sha256 == record.sha256);
+            Ok(Certified {
+                certificate,
+                growth,
+                unknown_records: used.into_iter().filter(|record| !known(record)).collect(),
+            })
+        });
     progress.finish();
-    Ok(certificate?)
+    answer
 }

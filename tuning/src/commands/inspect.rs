@@ -7,9 +7,10 @@ use certune::dynamics::{
 use serde::Serialize;
 
 use crate::catalogue;
-use crate::cli::{Context, Exit, InspectArgs, Numbers};
+use crate::cli::{Context, Exit, InspectArgs};
 use crate::error::Error;
 use crate::output::{self, number, table};
+use crate::values::Numbers;
 
 #[derive(Debug, Serialize)]
 struct Dynamics {

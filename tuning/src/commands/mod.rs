@@ -1,7 +1,7 @@
 //! One file a command: read what it needs, call the library, print.
 
 pub mod certify;
-mod claims;
+pub mod claims;
 pub mod inspect;
 pub mod lists;
 pub mod report;

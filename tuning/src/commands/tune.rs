@@ -3,25 +3,25 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use certune::certify::{Claims, FamilyValues};
+use certune::certify::FamilyValues;
 use certune::closed_loop::Scenario;
 use certune::dynamics::{Robot, for_joint_count};
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::{
-    AicObjective, Batch, BatchError, Bench, Gains, HeldOut, Question, SearchError, SearchSettings, Space, TuneError,
-    Tuned, tune,
+    AicObjective, Batch, BatchError, Bench, Evaluation, Gains, HeldOut, Objective, ObjectiveName, Outcome, Question,
+    SearchError, SearchSettings, Space, TuneError, Tuned, tune,
 };
-use certune::verify::{Certificate, Claim, Verdict};
-use certune::{ArmCertifier, StabilityError, family_of};
+use certune::verify::{Certificate, Claim, ClaimKind, Record, Verdict};
+use certune::{ArmCertifier, CertifiedObjective, Growth, Over, StabilityError, family_of};
 use serde::Serialize;
 
-use super::claims::{ClaimSummary, claims_in_words, summaries};
+use super::claims::{ClaimSummary, claims_in_words, growths, summaries};
 use crate::catalogue::{self, DEFAULT_PRESET, GainsSource};
 use crate::cli::{Context, ControllerName, Exit, TuneArgs};
 use crate::error::Error;
 use crate::output::{self, number, table};
 use crate::page::{self, Spread, spread};
-use crate::progress::Terminal;
+use crate::progress::{Terminal, achieved};
 use crate::run::{Folder, Run, RunFile};
 use crate::versions::versions;
 
@@ -41,6 +41,7 @@ struct Plan {
     robot_argument: String,
     scenario: Scenario,
     family: FamilyValues,
+    records: Vec<Record>,
     space: Space,
     start: Gains,
     question: Question,
@@ -77,7 +78,7 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
         .map_err(|source| Error::Threads { threads, source })?;
     let existed = plan.folder.path.exists();
     output::prepare_folder(&plan.folder.path)?;
-    let progress = Terminal::new(context.verbose);
+    let progress = Terminal::new(context.verbose).after(plan.question.objective);
     let outcome = pool.install(|| {
         for_joint_count!(plan.robot.joints(), N => tune_arm::<N>(&plan, &progress))
             .unwrap_or_else(|| Err(catalogue::too_many_joints(&plan.robot)))
@@ -87,7 +88,7 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
         // Only a folder that is empty goes; what keeps it from going is no part of the message.
         let _ = std::fs::remove_dir(&plan.folder.path);
     }
-    let (run, page) = outcome?;
+    let (run, page, growth) = outcome?;
     let files = plan.folder.write(&run, &page)?;
     let certified = run.file.record.winner.is_some();
     let claims = run.certificate.as_ref();
@@ -100,11 +101,11 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
             gains: run.file.record.tuned(),
             held_out: Compared { published: start.as_ref().map(spread), tuned: tuned.as_ref().map(spread) },
             about: claims.map(|certificate| certificate.document().about.clone()),
-            claims: claims.map(summaries).unwrap_or_default(),
+            claims: claims.map(|certificate| summaries(certificate, &growth)).unwrap_or_default(),
             elapsed_s: progress.elapsed_s(),
         })?;
     } else {
-        output::print(&in_words(&plan, &run, &files, progress.elapsed_s()))?;
+        output::print(&in_words(&plan, &run, &growth, &files, progress.elapsed_s()))?;
     }
     Ok(if certified { Exit::Holds } else { Exit::NotCertified })
 }
@@ -121,6 +122,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     let robot = catalogue::robot(&args.robot, args.tip.as_deref())?;
     let scenario = catalogue::scenario(args.scenario.as_deref(), &robot)?;
     let family = family_of(&scenario.plant_box)?;
+    let records = catalogue::records(&[])?;
     let (space_name, space) = catalogue::space(args.space.as_deref())?;
     let preset = space.start().unwrap_or(DEFAULT_PRESET).to_owned();
     let source = GainsSource::find(&preset)?;
@@ -136,6 +138,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
             robot_sha256: robot.sha256(),
             scenario: scenario.name.clone(),
             versions: versions(),
+            objective: args.objective.unwrap_or_else(|| space.objective()),
             search: SearchSettings::new(space.method(), budget, seed),
             batch_plants: BATCH_PLANTS,
             held_out_plants: HELD_OUT_PLANTS,
@@ -145,6 +148,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
         robot,
         scenario,
         family,
+        records,
         space,
         start,
         folder: Folder { path },
@@ -164,7 +168,7 @@ fn run_name(robot: &Robot, controller: &str, seed: u64) -> String {
 }
 
 /// The run and its page.
-fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, String), Error> {
+fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, String, Vec<Option<Growth>>), Error> {
     let Plan { robot, scenario, question, .. } = plan;
     let seed = question.search.seed;
     let misfit = |error| match error {
@@ -175,15 +179,26 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
         },
         BatchError::NoPlants | BatchError::Plant(_) => Error::Batch(error),
     };
-    let objective =
-        AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
     let judge = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants).map_err(misfit)?;
-    progress.begin("sampling the arm's constants");
-    let certifier = ArmCertifier::<N>::new(robot, &plan.family)?;
-    let bench = Bench { objective: &objective, judge: &judge, progress };
+    let certifier = ArmCertifier::<N>::new(robot, &plan.family)?.with_records(&plan.records, &Over::AllAngles)?;
+    if certifier.record().is_none() {
+        progress.begin("sampling the arm's constants");
+        certifier.constants();
+    }
+    let simulated =
+        AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
+    let certified = CertifiedObjective::new(question.objective, &certifier, (robot, scenario), seed, DEFAULT_SAMPLES)
+        .map_err(misfit)?;
+    let objective: &dyn Objective = match &certified {
+        Some(certified) => certified,
+        None => &simulated,
+    };
+    let bench = Bench { objective, judge: &judge, progress };
     let mut first_refusal: Option<Certificate> = None;
     let mut failure: Option<StabilityError> = None;
-    let certify = |gains: &Gains| match certifier.certify(&gains.on_every_joint(), Claims::All) {
+    let certify = |gains: &Gains| match certifier
+        .certify(&gains.on_every_joint(), &[ClaimKind::Exponential, ClaimKind::Region])
+    {
         Ok(certificate) if certificate.all_hold() => Ok(certificate),
         Ok(refusal) => {
             let reason = why_not(&refusal);
@@ -211,23 +226,24 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
     let run = Run { file, certificate: certificate.or(first_refusal) };
     progress.begin("writing the report");
     let page = page::page::<N>(&run, robot, &plan.robot_argument, &plan.folder)?;
-    Ok((run, page))
+    let growth = run.certificate.as_ref().map(|certificate| growths::<N>(robot, certificate)).transpose()?;
+    Ok((run, page, growth.unwrap_or_default()))
 }
 
 /// The claims that do not hold, in a few words.
 fn why_not(refusal: &Certificate) -> String {
     let entries = refusal.document().claims.iter().zip(refusal.checked());
     let reasons =
-        entries.filter(|(_, checked)| checked.verdict != Verdict::Holds).map(|(claim, checked)| match claim {
+        entries.filter(|(_, checked)| checked.verdict != Verdict::Holds).map(|(entry, checked)| match &entry.claim {
             Claim::Refused(claim) => format!(
                 "{} refused: unstable at inertia {} kg m^2, friction {} N m s/rad, gravity stiffness {} N m/rad",
-                checked.kind,
+                checked.kind.name(),
                 claim.point.inertia_kg_m2,
                 claim.point.friction_n_m_s_per_rad,
                 claim.point.stiffness_n_m_per_rad
             ),
-            Claim::NotProved(claim) => format!("{} not proved: {}", checked.kind, claim.reason.in_words()),
-            Claim::Exponential(_) | Claim::Region(_) => checked.kind.to_owned(),
+            Claim::NotProved(claim) => format!("{} not proved: {}", checked.kind.name(), claim.reason.in_words()),
+            _ => checked.kind.name().to_owned(),
         });
     reasons.collect::<Vec<_>>().join("; ")
 }
@@ -252,16 +268,27 @@ pub fn beyond_the_claims(scenario: &Scenario) -> Option<String> {
     })
 }
 
-fn in_words(plan: &Plan, run: &Run, files: &[PathBuf], elapsed_s: f64) -> String {
+fn in_words(plan: &Plan, run: &Run, growth: &[Option<Growth>], files: &[PathBuf], elapsed_s: f64) -> String {
     let record = &run.file.record;
     let question = &record.question;
     let mut text = format!(
-        "{} under the AIC in {}: {} candidates on {} plants, {elapsed_s:.1} s\n\n",
+        "{} under the AIC in {}: {} candidates{}, {elapsed_s:.1} s\n\n",
         question.robot,
         question.scenario,
         record.evaluations.len(),
-        question.batch_plants
+        match question.objective {
+            ObjectiveName::SettlingCost => format!(" on {} plants", question.batch_plants),
+            objective => format!(" for the largest {}", objective.name().replace('-', " ")),
+        }
     );
+    if question.objective != ObjectiveName::SettlingCost {
+        let reached = |evaluation: Option<&Evaluation>| match evaluation.map(|evaluation| evaluation.outcome) {
+            Some(Outcome::Certified { cost }) => achieved(cost.get(), question.objective),
+            _ => "not certified".to_owned(),
+        };
+        let _ =
+            writeln!(text, "{}: {}; tuned: {}\n", run.file.preset, reached(record.start()), reached(record.winner()));
+    }
     let HeldOut { start, tuned } = &record.held_out;
     let [published, tuned] = [start, tuned].map(|verdict| verdict.as_ref().map(spread));
     let row = |name: &str, digits: usize, scale: f64, value: fn(&Spread) -> Option<f64>| {
@@ -282,7 +309,7 @@ fn in_words(plan: &Plan, run: &Run, files: &[PathBuf], elapsed_s: f64) -> String
     text.push_str(&table(&header, &rows));
     let _ = writeln!(text);
     match (record.winner(), &run.certificate) {
-        (Some(_), Some(certificate)) => text.push_str(&claims_in_words(certificate, false)),
+        (Some(_), Some(certificate)) => text.push_str(&claims_in_words(certificate, growth, false)),
         (_, refusal) => {
             let reason = match record.certification.len() {
                 0 => "no candidate was stable and finished the task on every plant, so none came before the certifier"
@@ -296,7 +323,7 @@ fn in_words(plan: &Plan, run: &Run, files: &[PathBuf], elapsed_s: f64) -> String
             );
             if let Some(refusal) = refusal {
                 let _ = writeln!(text, "The best of them:");
-                text.push_str(&claims_in_words(refusal, false));
+                text.push_str(&claims_in_words(refusal, growth, false));
             }
         }
     }

@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
-use certune::verify::{Certificate, verify};
+use certune::verify::{Certificate, Record, Rejection, verify};
 use serde::Serialize;
 
 use super::claims::{AssumptionSummary, ClaimSummary, claims_in_words, summaries};
+use crate::catalogue;
 use crate::cli::{Context, Exit, VerifyArgs};
 use crate::error::Error;
 use crate::output;
@@ -26,10 +27,11 @@ struct FileSummary {
 }
 
 pub fn run(args: &VerifyArgs, context: Context) -> Result<Exit, Error> {
+    let records = catalogue::records(&args.constants)?;
     let mut worst = Exit::Holds;
     let mut files = Vec::new();
     for path in &args.files {
-        let (exit, summary) = check(path, context)?;
+        let (exit, summary) = check(path, &records, context)?;
         worst = worst.max(exit);
         files.push(summary);
     }
@@ -39,7 +41,7 @@ pub fn run(args: &VerifyArgs, context: Context) -> Result<Exit, Error> {
     Ok(worst)
 }
 
-fn check(path: &Path, context: Context) -> Result<(Exit, FileSummary), Error> {
+fn check(path: &Path, records: &[Record], context: Context) -> Result<(Exit, FileSummary), Error> {
     let file = path.display().to_string();
     let failed = |verdict, reason: String| FileSummary {
         file: file.clone(),
@@ -50,20 +52,21 @@ fn check(path: &Path, context: Context) -> Result<(Exit, FileSummary), Error> {
         claims: Vec::new(),
         assumptions: Vec::new(),
     };
-    let read = output::read_file(path)
-        .and_then(|text| verify(&text).map_err(|source| Error::Certificate { path: path.to_path_buf(), source }));
+    let read = output::read_file(path).and_then(|text| {
+        verify(&text, records).map_err(|source| Error::Certificate { path: path.to_path_buf(), source })
+    });
     match read {
         Err(error) => {
             output::say(&error.in_full());
             Ok((Exit::Unreadable, failed("unreadable", error.to_string())))
         }
         Ok(Err(rejection)) => {
-            output::say(&format!("rejected: {file}: {rejection}\n  try: the file as it was written, or certify again"));
+            output::say(&format!("rejected: {file}: {rejection}\n  try: {}", advice(&rejection)));
             Ok((Exit::NotCertified, failed("rejected", rejection.to_string())))
         }
         Ok(Ok(certificate)) => {
             if !context.json {
-                output::print(&format!("{file}\n{}\n", claims_in_words(&certificate, true)))?;
+                output::print(&format!("{file}\n{}\n", claims_in_words(&certificate, &[], true)))?;
             }
             let exit = exit_of(&certificate);
             let summary = FileSummary {
@@ -72,11 +75,29 @@ fn check(path: &Path, context: Context) -> Result<(Exit, FileSummary), Error> {
                 reason: None,
                 sha256: Some(certificate.document().sha256.clone()),
                 about: Some(certificate.document().about.clone()),
-                claims: summaries(&certificate),
+                claims: summaries(&certificate, &[]),
                 assumptions: certificate.assumptions().into_iter().map(Into::into).collect(),
             };
             Ok((exit, summary))
         }
+    }
+}
+
+/// What to do about a rejection.
+fn advice(rejection: &Rejection) -> &'static str {
+    match rejection {
+        Rejection::Record { .. } => {
+            "--constants with the record that the certificate was made with (`autotune constants` makes one), or certify again"
+        }
+        Rejection::Hash { .. }
+        | Rejection::Empty
+        | Rejection::Crowded { .. }
+        | Rejection::Form
+        | Rejection::Head(_)
+        | Rejection::About { .. }
+        | Rejection::Statement { .. }
+        | Rejection::Grade { .. }
+        | Rejection::Claim { .. } => "the file as it was written, or certify again",
     }
 }
 

@@ -10,6 +10,7 @@ use certune::verify::{self, Certificate, Checked};
 use num_traits::ToPrimitive;
 
 use super::runs::label;
+use crate::commands::claims::{growth_in_words, growths};
 use crate::error::Error;
 use crate::run::Run;
 
@@ -31,20 +32,27 @@ pub fn evidence<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -
         return Ok(CertificateRecord { pole_map, ..CertificateRecord::default() });
     };
     let document = certificate.document();
-    let find = |value: fn(&verify::Claim) -> Option<f64>| document.claims.iter().find_map(value);
+    let find = |value: fn(&verify::Claim) -> Option<f64>| document.claims.iter().find_map(|entry| value(&entry.claim));
     let certified_rate_per_s = find(|claim| match claim {
         verify::Claim::Exponential(claim) => Some(claim.rate_per_s.to_f64()),
-        verify::Claim::Region(_) | verify::Claim::Refused(_) | verify::Claim::NotProved(_) => None,
+        _ => None,
     });
     let radius_rad = find(|claim| match claim {
         verify::Claim::Region(claim) => Some(claim.radius_rad.to_f64()),
-        verify::Claim::Exponential(_) | verify::Claim::Refused(_) | verify::Claim::NotProved(_) => None,
+        _ => None,
     });
-    let entries = document.claims.iter().zip(certificate.checked());
+    let growth = growths::<N>(robot, certificate)?;
+    let entries = document.claims.iter().zip(certificate.checked()).zip(growth);
+    let rows = entries.map(|((entry, checked), growth)| {
+        let mut row = claim_row(&entry.claim, checked, certificate, slowest);
+        row.counterexample.extend(growth.as_ref().map(growth_in_words));
+        row
+    });
+    let rows = rows.collect();
     Ok(CertificateRecord {
         file_name: "certificate.json".to_owned(),
         sha256: document.sha256.clone(),
-        claims: entries.map(|(claim, checked)| claim_row(claim, checked, certificate, slowest)).collect(),
+        claims: rows,
         pole_map: Some(PoleMap { configurations: CONFIGURATIONS as u64, poles, certified_rate_per_s }),
         region: Some(RegionRecord { radius_rad, steps: steps(run) }),
     })
@@ -58,14 +66,15 @@ fn grade(grade: verify::Grade) -> Grade {
 }
 
 fn claim_row(claim: &verify::Claim, checked: &Checked, certificate: &Certificate, slowest: Option<f64>) -> Claim {
-    let assumptions = certificate
-        .assumptions()
-        .into_iter()
-        .map(|assumption| Assumption { grade: grade(assumption.grade), text: assumption.text });
+    // The constants are evidence of a grade; the rest says what arm and loop are taken to be.
+    let assumptions = certificate.assumptions().into_iter().enumerate().map(|(index, assumption)| Assumption {
+        grade: (index == 0).then(|| grade(assumption.grade)),
+        text: assumption.text,
+    });
     // The statement alone does not say of which arm, gains and plants it speaks.
-    let about = Assumption { text: certificate.document().about.clone(), grade: Grade::Conditional };
+    let about = Assumption { text: certificate.document().about.clone(), grade: None };
     Claim {
-        kind: checked.kind.to_owned(),
+        kind: checked.kind.name().to_owned(),
         verdict: match checked.verdict {
             verify::Verdict::Holds => Verdict::Holds,
             verify::Verdict::Refused => Verdict::Refused,
@@ -87,10 +96,6 @@ fn margins(claim: &verify::Claim, checked: &Checked, slowest: Option<f64>) -> Ve
             margin("certified decay rate", Some(claim.rate_per_s.to_f64()), "/s"),
             margin("slowest pole of the sample", slowest, "/s"),
         ],
-        verify::Claim::Region(claim) => vec![
-            margin("certified radius", Some(claim.radius_rad.to_f64()), "rad"),
-            margin("certified decay rate of the Lyapunov function's root", Some(claim.rate_per_s.to_f64()), "/s"),
-        ],
         verify::Claim::Refused(_) => vec![margin("slowest pole of the sample", slowest, "/s")],
         verify::Claim::NotProved(claim) => {
             vec![margin(
@@ -98,6 +103,10 @@ fn margins(claim: &verify::Claim, checked: &Checked, slowest: Option<f64>) -> Ve
                 claim.distance.as_ref().map(verify::Number::to_f64),
                 "solver's units",
             )]
+        }
+        other => {
+            let figures = other.figures().into_iter();
+            figures.map(|f| margin(&format!("certified {}", f.name), Some(f.value.to_f64()), f.unit)).collect()
         }
     };
     let pivots = checked.inequalities.iter().filter_map(|inequality| inequality.smallest_pivot.as_ref()?.to_f64());
@@ -111,7 +120,7 @@ fn margins(claim: &verify::Claim, checked: &Checked, slowest: Option<f64>) -> Ve
 fn counterexample(claim: &verify::Claim) -> Vec<String> {
     let refused = match claim {
         verify::Claim::Refused(refused) => refused,
-        verify::Claim::Exponential(_) | verify::Claim::Region(_) | verify::Claim::NotProved(_) => return Vec::new(),
+        _ => return Vec::new(),
     };
     refused.attained.iter().map(|arm| {
         let scales: Vec<String> = arm.link_mass_scale.iter().map(ToString::to_string).collect();

@@ -27,8 +27,8 @@ pub fn spread(verdict: &Verdict) -> Spread {
     };
     let figure = |value: fn(&Figures) -> Option<f64>| worst(&|plant: &PlantResult| value(&plant.figures));
     Spread {
-        cost_s: verdict.outcome.cost_s(),
-        worst_cost_s: worst(&|plant| plant.outcome.cost_s()),
+        cost_s: verdict.outcome.cost(),
+        worst_cost_s: worst(&|plant| plant.outcome.cost()),
         settling_time_s: figure(|figures| figures.settling_time_s),
         final_error_rad: figure(|figures| figures.final_error_rad),
         overshoot: figure(|figures| figures.overshoot),

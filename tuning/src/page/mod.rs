@@ -13,7 +13,7 @@ use certune::report::{
     Asked, CommandLine, CostMeaning, Evaluation, GainRow, Pair, RangeRow, SearchBounds, SearchRecord, SensitivityRow,
     TuningReport, Version, tuning_report,
 };
-use certune::tune::{Freedom, Gain, Gains, Outcome, Phase, RunRecord, Scale};
+use certune::tune::{Freedom, Gain, Gains, ObjectiveName, Outcome, Phase, RunRecord, Scale};
 
 use crate::catalogue;
 use crate::error::Error;
@@ -77,16 +77,28 @@ fn asked(run: &Run, robot: &Robot, robot_argument: &str) -> Asked {
         scenario: question.scenario.clone(),
         scenario_in_words: run.file.scenario.description.clone(),
         plant_box: plant_box_rows(&run.file.scenario.plant_box),
-        cost: CostMeaning {
-            unit: "s".to_owned(),
-            in_words: "Per move: lag (the time constant of a first-order arm with the same time-weighted error) + torque-rate RMS over \
-                       1000 N m/s + overshoot + time at the torque limits; mean over the moves, then over the worse half of the plants."
-                .to_owned(),
-        },
+        cost: CostMeaning { unit: "s".to_owned(), in_words: cost_in_words(question.objective) },
         seed: question.search.seed,
         budget: question.search.evaluations as u64,
         command: command(run, robot_argument),
     }
+}
+
+/// What the cost of the held-out plants means, after what the search was after if that is something else.
+fn cost_in_words(objective: ObjectiveName) -> String {
+    let sought = match objective {
+        ObjectiveName::SettlingCost => "",
+        ObjectiveName::CertifiedRate => {
+            "The search was after the largest certified decay rate. The held-out plants are compared by this cost. "
+        }
+        ObjectiveName::CertifiedRadius => {
+            "The search was after the largest certified radius. The held-out plants are compared by this cost. "
+        }
+    };
+    format!(
+        "{sought}Per move: lag (the time constant of a first-order arm with the same time-weighted error) + torque-rate RMS over 1000 N m/s + \
+         overshoot + time at the torque limits; mean over the moves, then over the worse half of the plants."
+    )
 }
 
 /// The command that repeats the run; a scenario or space that is not built in is named by a file of its name.
@@ -102,6 +114,9 @@ fn command(run: &Run, robot_argument: &str) -> String {
     }
     if !catalogue::SPACES.iter().any(|(name, _)| *name == run.file.space_name) {
         command.push_str(&format!(" --space {}", quoted(&format!("{}.toml", run.file.space_name))));
+    }
+    if question.objective != ObjectiveName::SettlingCost {
+        command.push_str(&format!(" --objective {}", question.objective.name()));
     }
     command.push_str(&format!(" --seed {} --budget {}", search.seed, search.evaluations));
     command
@@ -163,9 +178,14 @@ fn gain_rows(record: &RunRecord, gains: &Pair<Gains>) -> Vec<GainRow> {
 }
 
 fn search(record: &RunRecord) -> SearchRecord {
+    let objective = record.question.objective;
     let mut best_so_far: Option<f64> = None;
     let evaluations = record.evaluations.iter().map(|evaluation| {
-        let cost = evaluation.outcome.cost_s();
+        // A candidate without a certificate has no figure to compare.
+        let cost = match (evaluation.outcome, objective) {
+            (Outcome::Uncertified { .. }, ObjectiveName::CertifiedRate | ObjectiveName::CertifiedRadius) => None,
+            (outcome, _) => outcome.cost(),
+        };
         best_so_far = match (best_so_far, cost) {
             (Some(best), Some(cost)) => Some(best.min(cost)),
             (best, cost) => best.or(cost),
@@ -178,7 +198,7 @@ fn search(record: &RunRecord) -> SearchRecord {
         let outcome = match evaluation.outcome {
             Outcome::Certified { .. } => "certified",
             Outcome::Simulated { .. } => "simulated, certificate not asked for",
-            Outcome::Uncertified { .. } => "simulated, certificate refused",
+            Outcome::Uncertified { .. } => "certificate refused",
             Outcome::Unstable { .. } => "unstable",
             Outcome::Diverged { .. } => "diverged",
         };
@@ -192,13 +212,18 @@ fn search(record: &RunRecord) -> SearchRecord {
     });
     SearchRecord {
         evaluations: evaluations.collect(),
-        published_cost: record.start().and_then(|start| start.outcome.cost_s()),
+        unit: match objective {
+            ObjectiveName::SettlingCost | ObjectiveName::CertifiedRate => "s",
+            ObjectiveName::CertifiedRadius => "1/rad",
+        }
+        .to_owned(),
+        published_cost: record.start().and_then(|start| start.outcome.cost()),
     }
 }
 
 fn sensitivity(record: &RunRecord) -> Vec<SensitivityRow> {
-    let Some(cost) = record.winner().and_then(|winner| winner.outcome.cost_s()) else { return Vec::new() };
-    let ratio = |outcome: Outcome| outcome.cost_s().map(|changed| changed / cost);
+    let Some(cost) = record.winner().and_then(|winner| winner.outcome.cost()) else { return Vec::new() };
+    let ratio = |outcome: Outcome| outcome.cost().map(|changed| changed / cost);
     let row = |row: &certune::tune::Sensitivity| SensitivityRow {
         gain: row.gain.key().to_owned(),
         ratio_at_minus_10_percent: ratio(row.at_minus_10_percent),
@@ -255,13 +280,20 @@ fn method(run: &Run, certified: bool) -> Vec<String> {
     let question = &record.question;
     let plants = runs::middle(&run.file.scenario.plant_box);
     let mut paragraphs = vec![
-        format!(
-            "{} candidates were looked at. Each whose linearised loop decays at every configuration of a fixed sample ran the scenario on the \
-             same {} plants, drawn from the box with seed {}.",
-            record.evaluations.len(),
-            question.batch_plants,
-            question.search.seed
-        ),
+        match question.objective {
+            ObjectiveName::SettlingCost => format!(
+                "{} candidates were looked at. Each whose linearised loop decays at every configuration of a fixed sample ran the scenario \
+                 on the same {} plants, drawn from the box with seed {}.",
+                record.evaluations.len(),
+                question.batch_plants,
+                question.search.seed
+            ),
+            ObjectiveName::CertifiedRate | ObjectiveName::CertifiedRadius => format!(
+                "{} candidates were looked at. Each whose linearised loop decays at every configuration of a fixed sample was certified on the \
+                 box; its cost is the inverse of the certified figure. None was simulated in the search.",
+                record.evaluations.len()
+            ),
+        },
         format!(
             "Candidates went before the certifier from the lowest cost upwards ({} of them). The certificate is claimed on the whole box, \
              not on the plants that were drawn. {} further plants, which the search never saw, judge the result.",

@@ -98,7 +98,7 @@ pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Re
 
 /// The costs that a verdict holds.
 fn recorded(verdict: Option<&Verdict>) -> Option<Vec<Option<f64>>> {
-    let cost = |plant: &PlantResult| plant.outcome.cost_s();
+    let cost = |plant: &PlantResult| plant.outcome.cost();
     verdict.map(|verdict| verdict.plants.iter().map(cost).collect())
 }
 
@@ -157,7 +157,7 @@ fn held_out<const N: usize>(batch: &Batch<N>, aic: &Aic<N>, start_rad: &[f64]) -
         let mut recorder = Trajectory::new(BAND_EVERY, |_: &Sample<'_, N, AicState<N>>| ());
         let metrics = simulate(plant, task, aic, batch.noise(*index), &mut recorder);
         let errors: Vec<f64> = recorder.rows().iter().map(|row| (row.q - row.goal).norm()).collect();
-        (errors, score::of_run(&metrics, start_rad, task.step_s).cost_s())
+        (errors, score::of_run(&metrics, start_rad, task.step_s).cost())
     };
     let (errors, costs): (Vec<Vec<f64>>, Vec<Option<f64>>) = batch.plants().par_iter().map(one).unzip();
     let samples = errors.iter().map(Vec::len).max().unwrap_or(0);

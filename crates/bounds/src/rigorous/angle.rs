@@ -94,7 +94,7 @@ fn pi() -> Interval {
 }
 
 /// Enclosures of cosine and sine.
-fn cos_sin(x: Interval) -> [Interval; 2] {
+pub(crate) fn cos_sin(x: Interval) -> [Interval; 2] {
     let mut doublings = 0;
     let mut divisor = 1.0;
     while x.lo.abs().max(x.hi.abs()) > divisor {

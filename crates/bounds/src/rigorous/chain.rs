@@ -206,7 +206,7 @@ pub(crate) fn composite<T: Scalar>(own: &Sym4<T>, b: &Step<T>, child: &Sym4<T>) 
     sum
 }
 
-/// `A B` for homogeneous transforms.
+/// `A B` for homogeneous transforms; A may also be a derivative of one, B has `(0 0 0 1)` below it.
 #[inline]
 pub(crate) fn compose<T: Scalar>(a: &Step<T>, b: &Step<T>) -> Step<T> {
     std::array::from_fn(|r| {
@@ -215,12 +215,6 @@ pub(crate) fn compose<T: Scalar>(a: &Step<T>, b: &Step<T>) -> Step<T> {
             if c == 3 { sum + a[r][3] } else { sum }
         })
     })
-}
-
-/// `A B` where A is the derivative of a transform: its last row is zero.
-#[inline]
-pub(crate) fn carry<T: Scalar>(a: &Step<T>, b: &Step<T>) -> Step<T> {
-    std::array::from_fn(|r| std::array::from_fn(|c| a[r][0] * b[0][c] + a[r][1] * b[1][c] + a[r][2] * b[2][c]))
 }
 
 /// The identity.

@@ -403,3 +403,28 @@ fn allowance<const N: usize>(chain: &Chain<N, f64>, scale: &Chain<N, f64>, grid:
     }
     1.01 * sum.sqrt() + f64::MIN_POSITIVE.sqrt()
 }
+
+/// `dM/dq_j`, for every j, at one point of the circle for each joint; `N >= 2`.
+#[cfg(test)]
+pub(crate) fn slopes_at<const N: usize, T: Scalar>(chain: &Chain<N, T>, at: &[[T; 2]; N]) -> [[[T; N]; N]; N] {
+    let mut steps = [[[T::zero(); 4]; 3]; N];
+    for j in 2..N {
+        steps[j] = chain.step(j, at[j]);
+    }
+    let base = Base::new(chain);
+    let outer = outer(chain, &steps, &base);
+    let square = base.square(at[1]);
+    let [c, s] = at[1];
+    let mut slopes = outer.block;
+    for j in 1..N {
+        slopes[j][0][0] = nine(&outer.rate[j], &square);
+        for b in 1..N {
+            let [x, y, z] = outer.row[j][b];
+            slopes[j][b][0] = x + (y * c + z * s);
+            for a in 0..b {
+                slopes[j][a][b] = slopes[j][b][a];
+            }
+        }
+    }
+    slopes
+}

@@ -21,7 +21,7 @@ use certune_linsys::JointMatrix;
 
 use crate::eigen::symmetric_eigen;
 use crate::rigorous::angle::{Points, Span};
-use crate::rigorous::chain::{Chain, Step, Vec3, carry, compose, identity, turned};
+use crate::rigorous::chain::{Chain, Step, Vec3, compose, identity, turned};
 use crate::rigorous::definite::{Factor, cholesky_allowance};
 use crate::rigorous::scalar::{Majorant, Scalar, UNIT, frobenius};
 use crate::rigorous::sweep::Sweep;
@@ -49,7 +49,7 @@ fn outer<const N: usize, T: Scalar>(first: usize, steps: &[Step<T>; N], moments:
     for b in first..N {
         if b > first {
             for a in first..b {
-                moved[a] = carry(&moved[a], &steps[b]);
+                moved[a] = compose(&moved[a], &steps[b]);
             }
             frame = compose(&frame, &steps[b]);
         }
@@ -108,11 +108,21 @@ pub(crate) fn first_joint<const N: usize>(chain: &Chain<N, f64>) -> usize {
     usize::from(along)
 }
 
-/// The sweep: the stiffness, then the torque of each joint.
+/// What a sweep looks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    /// The stiffness.
+    Stiffness,
+    /// The torque of each joint.
+    Torque,
+}
+
+/// The sweep: the stiffness, then the torque of each joint; zero for what is not wanted.
 pub(crate) struct GravitySweep<const N: usize> {
     chain: Chain<N, f64>,
     own: [Moment<f64>; N],
     first: usize,
+    wanted: Wanted,
     gammas: Vec<Vec3<f64>>,
     /// Largest `|gamma_z|`, and largest length of the x and y parts over the corners and over the circle itself.
     along: f64,
@@ -131,7 +141,7 @@ pub(crate) struct GravityState<const N: usize> {
 
 impl<const N: usize> GravitySweep<N> {
     /// `corners[j]` is the polygon of joint j; those before [`first_joint`] are not used, and that joint is below N.
-    pub(crate) fn new(chain: &Chain<N, f64>, spans: &[Span; N], corners: &[Points]) -> Self {
+    pub(crate) fn new(chain: &Chain<N, f64>, spans: &[Span; N], corners: &[Points], wanted: Wanted) -> Self {
         let first = first_joint(chain);
         let row = before_turn(chain, first);
         let gammas: Vec<Vec3<f64>> = corners[first].at.iter().map(|corner| turned_row(&row, *corner)).collect();
@@ -144,6 +154,7 @@ impl<const N: usize> GravitySweep<N> {
         Self {
             own: own_moments(chain),
             first,
+            wanted,
             along: row[2].abs(),
             radius: gammas.iter().map(length).fold(0.0, f64::max),
             unit_radius,
@@ -222,6 +233,46 @@ impl<const N: usize> GravitySweep<N> {
         }
         t
     }
+
+    #[inline]
+    fn visit_torque(&self, state: &mut GravityState<N>, outer: &Outer<N, f64>) {
+        for j in self.first..N {
+            let v = &outer.torque[j];
+            let across = (v[0] * v[0] + v[1] * v[1]).sqrt();
+            let most = |radius: f64| {
+                (self.along * v[2].abs() + radius * across) * (1.0 + 16.0 * UNIT) + self.torque_allowance[j]
+            };
+            if most(self.radius) <= state.torque[j] {
+                continue;
+            }
+            let here = match self.unit_radius {
+                Some(radius) => most(radius),
+                None => {
+                    let largest = self.gammas.iter().map(|gamma| dot(gamma, v).abs()).fold(0.0, f64::max);
+                    largest * (1.0 + 16.0 * UNIT) + self.torque_allowance[j]
+                }
+            };
+            state.torque[j] = state.torque[j].max(here);
+        }
+    }
+
+    #[inline]
+    fn visit_stiffness(&self, state: &mut GravityState<N>, outer: &Outer<N, f64>) {
+        if self.quick(state.stiffness, outer) {
+            return;
+        }
+        for gamma in &self.gammas {
+            let mut stiffness = [[0.0; N]; N];
+            for b in self.first..N {
+                for a in self.first..=b {
+                    stiffness[b - self.first][a - self.first] = dot(gamma, &outer.stiffness[b][a]);
+                }
+            }
+            if !self.suffices(state.stiffness, &stiffness) {
+                state.stiffness = state.stiffness.max(self.raised(&stiffness));
+            }
+        }
+    }
 }
 
 impl<const N: usize> Sweep for GravitySweep<N> {
@@ -245,37 +296,9 @@ impl<const N: usize> Sweep for GravitySweep<N> {
 
     fn visit(&self, state: &mut Self::State) {
         let outer = outer(self.first, &state.steps, &state.moments);
-        for j in self.first..N {
-            let v = &outer.torque[j];
-            let across = (v[0] * v[0] + v[1] * v[1]).sqrt();
-            let most = |radius: f64| {
-                (self.along * v[2].abs() + radius * across) * (1.0 + 16.0 * UNIT) + self.torque_allowance[j]
-            };
-            if most(self.radius) <= state.torque[j] {
-                continue;
-            }
-            let here = match self.unit_radius {
-                Some(radius) => most(radius),
-                None => {
-                    let largest = self.gammas.iter().map(|gamma| dot(gamma, v).abs()).fold(0.0, f64::max);
-                    largest * (1.0 + 16.0 * UNIT) + self.torque_allowance[j]
-                }
-            };
-            state.torque[j] = state.torque[j].max(here);
-        }
-        if self.quick(state.stiffness, &outer) {
-            return;
-        }
-        for gamma in &self.gammas {
-            let mut stiffness = [[0.0; N]; N];
-            for b in self.first..N {
-                for a in self.first..=b {
-                    stiffness[b - self.first][a - self.first] = dot(gamma, &outer.stiffness[b][a]);
-                }
-            }
-            if !self.suffices(state.stiffness, &stiffness) {
-                state.stiffness = state.stiffness.max(self.raised(&stiffness));
-            }
+        match self.wanted {
+            Wanted::Stiffness => self.visit_stiffness(state, &outer),
+            Wanted::Torque => self.visit_torque(state, &outer),
         }
     }
 
@@ -307,27 +330,55 @@ fn allowances<const N: usize>(chain: &Chain<N, f64>, first: usize, corners: &[Po
     (frobenius(&errors), std::array::from_fn(|j| dot(&gamma, &outer.torque[j]).bound()))
 }
 
-/// `dg/dq` at one corner of every joint, in plain floating point, for choosing a plan.
+/// `dg/dq` at one corner of every joint.
 pub(crate) fn stiffness_at<const N: usize>(chain: &Chain<N, f64>, corners: &[[f64; 2]; N]) -> [[f64; N]; N] {
-    let first = first_joint(chain);
-    let mut stiffness = [[0.0; N]; N];
-    if first >= N {
-        return stiffness;
+    stiffness_from(chain, first_joint(chain), corners)
+}
+
+/// The same, when the first joint is known.
+pub(crate) fn stiffness_from<const N: usize, T: Scalar>(
+    chain: &Chain<N, T>,
+    first: usize,
+    corners: &[[T; 2]; N],
+) -> [[T; N]; N] {
+    let mut stiffness = [[T::zero(); N]; N];
+    if first < N {
+        let (outer, gamma) = at_corners(chain, first, corners);
+        for b in first..N {
+            for a in first..=b {
+                stiffness[b][a] = dot(&gamma, &outer.stiffness[b][a]);
+                stiffness[a][b] = stiffness[b][a];
+            }
+        }
     }
+    stiffness
+}
+
+/// Gravity torques at one corner of every joint.
+pub(crate) fn torque_at<const N: usize>(chain: &Chain<N, f64>, corners: &[[f64; 2]; N]) -> [f64; N] {
+    let mut torque = [0.0; N];
+    let first = first_joint(chain);
+    if first < N {
+        let (outer, gamma) = at_corners(chain, first, corners);
+        for j in first..N {
+            torque[j] = dot(&gamma, &outer.torque[j]);
+        }
+    }
+    torque
+}
+
+/// All joints set; `first < N`.
+fn at_corners<const N: usize, T: Scalar>(
+    chain: &Chain<N, T>,
+    first: usize,
+    corners: &[[T; 2]; N],
+) -> (Outer<N, T>, Vec3<T>) {
     let own = own_moments(chain);
     let mut moments = own;
-    let mut steps = [[[0.0; 4]; 3]; N];
+    let mut steps = [[[T::zero(); 4]; 3]; N];
     for j in (first + 1..N).rev() {
         steps[j] = chain.step(j, corners[j]);
         moments[j - 1] = shifted(&own[j - 1], &steps[j], &moments[j]);
     }
-    let outer = outer(first, &steps, &moments);
-    let gamma = turned_row(&before_turn(chain, first), corners[first]);
-    for b in first..N {
-        for a in first..=b {
-            stiffness[b][a] = dot(&gamma, &outer.stiffness[b][a]);
-            stiffness[a][b] = stiffness[b][a];
-        }
-    }
-    stiffness
+    (outer(first, &steps, &moments), turned_row(&before_turn(chain, first), corners[first]))
 }

@@ -25,7 +25,7 @@ use certune_linsys::JointMatrix;
 use crate::eigen::symmetric_eigen;
 use crate::error::BoundsError;
 use crate::rigorous::angle::Points;
-use crate::rigorous::chain::{Chain, Step, Sym4, carry, compose, composite, identity, turned};
+use crate::rigorous::chain::{Chain, Step, Sym4, compose, composite, identity, turned};
 use crate::rigorous::definite::{Factor, cholesky_allowance};
 use crate::rigorous::scalar::{Majorant, Scalar, UNIT, frobenius};
 use crate::rigorous::sweep::Sweep;
@@ -61,7 +61,7 @@ fn outer<const N: usize, T: Scalar>(steps: &[Step<T>; N], composites: &[Sym4<T>;
     for b in 1..N {
         if b > 1 {
             for a in 1..b {
-                moved[a] = carry(&moved[a], &steps[b]);
+                moved[a] = compose(&moved[a], &steps[b]);
             }
             frame = compose(&frame, &steps[b]);
         }
@@ -122,12 +122,12 @@ fn corner_inertia<T: Scalar>(own: &Sym4<T>, composite: &[T; 10], zeta: &[T; 10])
     (own[0][0] + own[1][1]) + sum
 }
 
-/// The sweep: for each of several weights, the smallest t found with `M <= t diag(w)` at every corner visited.
+/// The sweep: the smallest t found with `M <= t diag(w)` at every corner visited.
 pub(crate) struct InertiaSweep<const N: usize> {
     chain: Chain<N, f64>,
     own: [Sym4<f64>; N],
     rotor: [f64; N],
-    weights: Vec<[f64; N]>,
+    weights: [f64; N],
     inner: Vec<(usize, Inner<f64>)>,
     radii: Vec<f64>,
     /// Bound of the spectral norm of what the entries may be off by.
@@ -137,7 +137,7 @@ pub(crate) struct InertiaSweep<const N: usize> {
 pub(crate) struct InertiaState<const N: usize> {
     steps: [Step<f64>; N],
     composites: [Sym4<f64>; N],
-    maxima: Vec<f64>,
+    maximum: f64,
 }
 
 impl<const N: usize> InertiaSweep<N> {
@@ -145,7 +145,7 @@ impl<const N: usize> InertiaSweep<N> {
     pub(crate) fn new(
         chain: &Chain<N, f64>,
         rotor: [f64; N],
-        weights: Vec<[f64; N]>,
+        weights: [f64; N],
         corners: &[Points],
     ) -> Result<Self, BoundsError> {
         let chain = chain.physical()?;
@@ -175,14 +175,14 @@ impl<const N: usize> InertiaSweep<N> {
     }
 
     /// What is taken from the diagonal of `t diag(w) - M`.
-    fn shift(&self, t: f64, weights: &[f64; N]) -> f64 {
-        self.allowance + cholesky_allowance(N, 2.0 * t * weights.iter().sum::<f64>())
+    fn shift(&self, t: f64) -> f64 {
+        self.allowance + cholesky_allowance(N, 2.0 * t * self.weights.iter().sum::<f64>())
     }
 
     /// The factor of rows 1 to N-1 of `t diag(w) - M`, in this order.
     #[inline]
-    fn block(&self, outer: &Outer<N, f64>, square: f64, weights: &[f64; N], t: f64) -> Option<Factor<N>> {
-        let shift = self.shift(t, weights);
+    fn block(&self, outer: &Outer<N, f64>, square: f64, t: f64) -> Option<Factor<N>> {
+        let shift = self.shift(t);
         let mut factor = Factor::EMPTY;
         for b in 1..N {
             let mut left = [0.0; N];
@@ -190,7 +190,7 @@ impl<const N: usize> InertiaSweep<N> {
                 left[a - 1] = -(square * outer.alpha[b][a] + outer.beta[b][a]);
             }
             let inertia = (square * outer.alpha[b][b] + outer.beta[b][b]) + self.rotor[b];
-            if !factor.push(b - 1, &left, t * weights[b] - inertia - shift) {
+            if !factor.push(b - 1, &left, t * self.weights[b] - inertia - shift) {
                 return None;
             }
         }
@@ -215,14 +215,14 @@ impl<const N: usize> InertiaSweep<N> {
     }
 
     /// A t that suits this corner and passes the test for it.
-    fn raised(&self, m: &[[f64; N]; N], weights: &[f64; N]) -> f64 {
-        let roots = weights.map(f64::sqrt);
+    fn raised(&self, m: &[[f64; N]; N]) -> f64 {
+        let roots = self.weights.map(f64::sqrt);
         let scaled = JointMatrix::<N>::from_fn(|a, b| m[a][b] / (roots[a] * roots[b]));
         let mut t = symmetric_eigen(&scaled).largest().0 * (1.0 + RAISE);
-        let least = weights.iter().fold(f64::INFINITY, |least, w| least.min(*w));
+        let least = self.weights.iter().fold(f64::INFINITY, |least, w| least.min(*w));
         loop {
-            t += 2.0 * self.shift(t, weights) / least;
-            let shift = self.shift(t, weights);
+            t += 2.0 * self.shift(t) / least;
+            let shift = self.shift(t);
             let mut factor = Factor::<N>::EMPTY;
             // Same order as in the sweep: joint 0 last.
             let order: [usize; N] = std::array::from_fn(|i| (i + 1) % N);
@@ -231,7 +231,7 @@ impl<const N: usize> InertiaSweep<N> {
                 for k in 0..i {
                     left[k] = -m[order[i]][order[k]];
                 }
-                factor.push(i, &left, t * weights[order[i]] - m[order[i]][order[i]] - shift)
+                factor.push(i, &left, t * self.weights[order[i]] - m[order[i]][order[i]] - shift)
             });
             if passes || !t.is_finite() {
                 return t;
@@ -248,7 +248,7 @@ impl<const N: usize> Sweep for InertiaSweep<N> {
         InertiaState {
             steps: [[[0.0; 4]; 3]; N],
             composites: self.own,
-            maxima: if maxima.is_empty() { vec![0.0; self.weights.len()] } else { maxima.to_vec() },
+            maximum: maxima.first().copied().unwrap_or(0.0),
         }
     }
 
@@ -261,35 +261,34 @@ impl<const N: usize> Sweep for InertiaSweep<N> {
     fn visit(&self, state: &mut Self::State) {
         let outer = outer(&state.steps, &state.composites);
         let composite: [f64; 10] = UPPER.map(|(i, k)| state.composites[1][i][k]);
-        for (weights, maximum) in self.weights.iter().zip(&mut state.maxima) {
-            let mut class = usize::MAX;
-            let mut factor = None;
-            for at in &self.inner {
-                if at.0 != class {
-                    class = at.0;
-                    factor = self.block(&outer, self.radii[class], weights, *maximum);
+        let mut class = usize::MAX;
+        let mut factor = None;
+        let mut shift = self.shift(state.maximum);
+        for at in &self.inner {
+            if at.0 != class {
+                class = at.0;
+                factor = self.block(&outer, self.radii[class], state.maximum);
+            }
+            let passes = factor.as_ref().is_some_and(|factor| {
+                let mut left = [0.0; N];
+                for b in 1..N {
+                    left[b - 1] = -off_diagonal(&outer.wrench[b], &at.1.xi);
                 }
-                let shift = self.shift(*maximum, weights);
-                let passes = factor.as_ref().is_some_and(|factor| {
-                    let mut left = [0.0; N];
-                    for b in 1..N {
-                        left[b - 1] = -off_diagonal(&outer.wrench[b], &at.1.xi);
-                    }
-                    let mut row = [0.0; N];
-                    let square = factor.row(N - 1, &left, &mut row);
-                    let inertia = corner_inertia(&self.own[0], &composite, &at.1.zeta) + self.rotor[0];
-                    *maximum * weights[0] - inertia - shift - square > 0.0
-                });
-                if !passes {
-                    *maximum = maximum.max(self.raised(&self.matrix(&outer, &composite, at), weights));
-                    factor = self.block(&outer, self.radii[class], weights, *maximum);
-                }
+                let mut row = [0.0; N];
+                let square = factor.row(N - 1, &left, &mut row);
+                let inertia = corner_inertia(&self.own[0], &composite, &at.1.zeta) + self.rotor[0];
+                state.maximum * self.weights[0] - inertia - shift - square > 0.0
+            });
+            if !passes {
+                state.maximum = state.maximum.max(self.raised(&self.matrix(&outer, &composite, at)));
+                factor = self.block(&outer, self.radii[class], state.maximum);
+                shift = self.shift(state.maximum);
             }
         }
     }
 
     fn maxima(&self, state: &Self::State) -> Vec<f64> {
-        state.maxima.clone()
+        vec![state.maximum]
     }
 }
 
@@ -324,24 +323,24 @@ fn allowance<const N: usize>(chain: &Chain<N, f64>, rotor: &[f64; N], corners: &
     frobenius(&errors)
 }
 
-/// M at one corner of every joint, without rotor inertia; in plain floating point, for choosing a plan.
-pub(crate) fn inertia_at<const N: usize>(chain: &Chain<N, f64>, corners: &[[f64; 2]; N]) -> [[f64; N]; N] {
-    let mut m = [[0.0; N]; N];
-    let own: [Sym4<f64>; N] = std::array::from_fn(|j| chain.second_moments(j));
+/// M at one corner of every joint, without rotor inertia.
+pub(crate) fn inertia_at<const N: usize, T: Scalar>(chain: &Chain<N, T>, corners: &[[T; 2]; N]) -> [[T; N]; N] {
+    let mut m = [[T::zero(); N]; N];
+    let own: [Sym4<T>; N] = std::array::from_fn(|j| chain.second_moments(j));
     if N < 2 {
         m[0][0] = own[0][0][0] + own[0][1][1];
         return m;
     }
-    let mut steps = [[[0.0; 4]; 3]; N];
+    let mut steps = [[[T::zero(); 4]; 3]; N];
     let mut composites = own;
-    for j in (1..N).rev() {
+    for j in (2..N).rev() {
         steps[j] = chain.step(j, corners[j]);
         composites[j - 1] = composite(&own[j - 1], &steps[j], &composites[j]);
     }
     let outer = outer(&steps, &composites);
     let inner = inner(chain, corners[1]);
     let square = corners[1][0] * corners[1][0] + corners[1][1] * corners[1][1];
-    m[0][0] = composites[0][0][0] + composites[0][1][1];
+    m[0][0] = corner_inertia(&own[0], &UPPER.map(|(i, k)| composites[1][i][k]), &inner.zeta);
     for b in 1..N {
         m[0][b] = off_diagonal(&outer.wrench[b], &inner.xi);
         m[b][0] = m[0][b];

@@ -49,7 +49,7 @@ use crate::error::BoundsError;
 use crate::rigorous::angle::{Points, Span, nodes};
 use crate::rigorous::chain::Chain;
 use crate::rigorous::coriolis::CoriolisSweep;
-use crate::rigorous::gravity::{GravitySweep, first_joint};
+use crate::rigorous::gravity::{GravitySweep, Wanted, first_joint};
 use crate::rigorous::inertia::InertiaSweep;
 use crate::rigorous::scalar::UNIT;
 use crate::rigorous::sweep::{Progress, maxima};
@@ -186,14 +186,15 @@ fn inertia_bounds<const N: usize>(
         let m_hi = up(inertia[0][0] + inertia[1][1] + rotor[0] + rounding);
         return Ok(InertiaBounds { m_hi, diagonal: vec![m_hi], rounding });
     }
-    let corners = polygons(spans, &plan.inertia_pieces)?;
-    let sweep = InertiaSweep::new(&chain, rotor, vec![[1.0; N], weights], &corners)?;
-    let found = maxima(&sweep, 2, &outer_corners(&corners, 2), progress);
-    Ok(InertiaBounds {
-        m_hi: up(found[0]),
-        diagonal: weights.iter().map(|w| up(w * found[1])).collect(),
-        rounding: sweep.allowance(),
-    })
+    let least = |weights: [f64; N], pieces: &[usize], progress: Progress| {
+        let corners = polygons(spans, pieces)?;
+        let sweep = InertiaSweep::new(&chain, rotor, weights, &corners)?;
+        let found = maxima(&sweep, 2, &outer_corners(&corners, 2), progress);
+        Ok::<_, BoundsError>((found[0], sweep.allowance()))
+    };
+    let (m_hi, rounding) = least([1.0; N], &plan.inertia_pieces, progress.part(0.0, 0.5))?;
+    let (multiple, _) = least(weights, &plan.diagonal_pieces, progress.part(0.5, 1.0))?;
+    Ok(InertiaBounds { m_hi: up(m_hi), diagonal: weights.iter().map(|w| up(w * multiple)).collect(), rounding })
 }
 
 struct GravityBounds {
@@ -209,38 +210,44 @@ fn gravity_bounds<const N: usize>(
     progress: Progress,
 ) -> Result<GravityBounds, BoundsError> {
     let mut total = GravityBounds { stiffness: 0.0, torque: vec![0.0; N], rounding: 0.0 };
-    let full = polygons(spans, &plan.gravity_pieces)?;
-    let one = |chain: &Chain<N, f64>, points: &[Points], moving: usize, progress: Progress| {
+    let one = |chain: &Chain<N, f64>, wanted: Wanted, pieces: &[usize], moving: usize, progress: Progress| {
         let first = first_joint(chain);
         if first >= N {
-            return (vec![0.0; N + 1], 0.0);
+            return Ok((vec![0.0; N + 1], 0.0));
         }
-        let sweep = GravitySweep::new(chain, spans, points);
-        let mut corners = outer_corners(points, first + 1);
+        let points = polygons(spans, pieces)?;
+        let sweep = GravitySweep::new(chain, spans, &points, wanted);
+        let mut corners = outer_corners(&points, first + 1);
         // Joints beyond the only body turn nothing.
         for list in corners.iter_mut().skip(moving.saturating_sub(first)) {
             list.truncate(1);
         }
-        (maxima(&sweep, first + 1, &corners, progress), sweep.allowance())
+        Ok::<_, BoundsError>((maxima(&sweep, first + 1, &corners, progress), sweep.allowance()))
+    };
+    // Stiffness, then torques, and what rounding cost the stiffness.
+    let both = |chain: &Chain<N, f64>, pieces: &[usize], moving: usize, progress: Progress| {
+        let (mut found, rounding) = one(chain, Wanted::Stiffness, pieces, moving, progress.part(0.0, 0.5))?;
+        let (torques, _) = one(chain, Wanted::Torque, &plan.torque_pieces, moving, progress.part(0.5, 1.0))?;
+        found[1..].copy_from_slice(&torques[1..]);
+        Ok::<_, BoundsError>((found, rounding))
     };
     let nominal = arms.nominal_models();
     for (k, model) in nominal.iter().enumerate() {
         let share = 0.7 / nominal.len() as f64;
-        let (found, rounding) =
-            one(&Chain::new(model), &full, N, progress.part(k as f64 * share, (k + 1) as f64 * share));
+        let part = progress.part(k as f64 * share, (k + 1) as f64 * share);
+        let (found, rounding) = both(&Chain::new(model), &plan.gravity_pieces, N, part)?;
         total.stiffness = total.stiffness.max(found[0]);
         for (torque, found) in total.torque.iter_mut().zip(&found[1..]) {
             *torque = torque.max(*found);
         }
         total.rounding = total.rounding.max(rounding);
     }
-    let parts = polygons(spans, &plan.gravity_part_pieces)?;
     for (link, (group, uncertainty)) in arms.uncertain_links().enumerate() {
         if uncertainty <= 0.0 {
             continue;
         }
-        let share = progress.part(0.7 + 0.3 * link as f64 / N as f64, 0.7 + 0.3 * (link + 1) as f64 / N as f64);
-        let (found, rounding) = one(&Chain::new(&group.model), &parts, link, share);
+        let part = progress.part(0.7 + 0.3 * link as f64 / N as f64, 0.7 + 0.3 * (link + 1) as f64 / N as f64);
+        let (found, rounding) = both(&Chain::new(&group.model), &plan.gravity_part_pieces, link, part)?;
         total.stiffness = up(total.stiffness + up(uncertainty * found[0]));
         for (torque, found) in total.torque.iter_mut().zip(&found[1..]) {
             *torque = up(*torque + up(uncertainty * found));

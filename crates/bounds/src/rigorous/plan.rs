@@ -18,7 +18,7 @@ use crate::error::BoundsError;
 use crate::rigorous::AngleSet;
 use crate::rigorous::angle::Span;
 use crate::rigorous::chain::Chain;
-use crate::rigorous::gravity::{first_joint, stiffness_at};
+use crate::rigorous::gravity::{first_joint, stiffness_at, torque_at};
 use crate::rigorous::inertia::inertia_at;
 use crate::sequence::Kronecker;
 
@@ -46,9 +46,9 @@ impl Effort {
     /// Corners of all joints but the innermost, times the same for the angles of k_c.
     fn budgets(self) -> Budgets {
         match self {
-            Self::Quick => Budgets { inertia: 2e4, gravity: 4e4, part: 2e3, grid: 2e4, part_grid: 2e4 },
-            Self::Standard => Budgets { inertia: 3e6, gravity: 6e6, part: 2e5, grid: 3e6, part_grid: 5e5 },
-            Self::Thorough => Budgets { inertia: 2e7, gravity: 4e7, part: 2e6, grid: 1e7, part_grid: 4e6 },
+            Self::Quick => Budgets { inertia: 4e4, gravity: 4e4, part: 2e3, torque: 4e4, grid: 6e4, part_grid: 1e5 },
+            Self::Standard => Budgets { inertia: 3e6, gravity: 6e6, part: 2e5, torque: 6e6, grid: 3e6, part_grid: 5e5 },
+            Self::Thorough => Budgets { inertia: 1e7, gravity: 2e7, part: 2e6, torque: 2e7, grid: 1e7, part_grid: 4e6 },
         }
     }
 }
@@ -57,6 +57,7 @@ struct Budgets {
     inertia: f64,
     gravity: f64,
     part: f64,
+    torque: f64,
     grid: f64,
     part_grid: f64,
 }
@@ -65,14 +66,18 @@ struct Budgets {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PolygonPlan {
-    /// Pieces of each joint's polygon for m_hi and the diagonal bound; nothing depends on the first joint.
+    /// Pieces of each joint's polygon for m_hi; nothing depends on the first joint.
     pub inertia_pieces: Vec<usize>,
     /// The diagonal bound is the smallest proved multiple of these.
     pub diagonal_weights: Vec<f64>,
-    /// Pieces for k_g and the gravity torques.
+    /// Pieces for the diagonal bound.
+    pub diagonal_pieces: Vec<usize>,
+    /// Pieces for k_g.
     pub gravity_pieces: Vec<usize>,
     /// The same for single links, where masses are uncertain.
     pub gravity_part_pieces: Vec<usize>,
+    /// Pieces for the gravity torques, of the whole arm and of single links.
+    pub torque_pieces: Vec<usize>,
     /// Equispaced angles for k_c.
     pub coriolis_grid: Vec<usize>,
     /// The same for single links, and for what the last link lacks of its mean about its own joint.
@@ -105,12 +110,29 @@ impl PolygonPlan {
         let inertia_weights = sensitivities(&samples, |at| largest(&inertia(at)));
         let gravity_weights = sensitivities(&samples, |at| symmetric_eigen(&stiffness(at)).dominant().0.abs());
         let matrices: Vec<JointMatrix<N>> = samples.iter().map(inertia).collect();
+        let diagonal_weights = diagonal_weights(&matrices);
+        let roots: Vec<f64> = diagonal_weights.iter().map(|w| w.sqrt()).collect();
+        let scaled = |at: &[[f64; 2]; N]| {
+            let m = inertia(at);
+            largest(&JointMatrix::<N>::from_fn(|a, b| m[(a, b)] / (roots[a] * roots[b])))
+        };
+        let diagonal_sensitivities = sensitivities(&samples, scaled);
+        // Every torque counts alike.
+        let mut torque_weights = [0.0; N];
+        for j in 0..N {
+            let one = sensitivities(&samples, |at| torque_at(&chain, at)[j].abs());
+            for (sum, weight) in torque_weights.iter_mut().zip(one) {
+                *sum += weight;
+            }
+        }
         let first = first_joint(&chain);
         Ok(Self {
             inertia_pieces: pieces(&spans, &inertia_weights, 1, budgets.inertia),
-            diagonal_weights: diagonal_weights(&matrices),
+            diagonal_pieces: pieces(&spans, &diagonal_sensitivities, 1, budgets.inertia),
+            diagonal_weights,
             gravity_pieces: pieces(&spans, &gravity_weights, first, budgets.gravity),
             gravity_part_pieces: pieces(&spans, &gravity_weights, first, budgets.part),
+            torque_pieces: pieces(&spans, &torque_weights, first, budgets.torque),
             coriolis_grid: grid::<N>(budgets.grid, N.saturating_sub(3), 2.0),
             coriolis_part_grid: grid::<N>(budgets.part_grid, N.saturating_sub(2), 1.5),
         })
@@ -121,6 +143,8 @@ impl PolygonPlan {
         let lists = [
             self.inertia_pieces.len(),
             self.diagonal_weights.len(),
+            self.diagonal_pieces.len(),
+            self.torque_pieces.len(),
             self.gravity_pieces.len(),
             self.gravity_part_pieces.len(),
             self.coriolis_grid.len(),
@@ -172,7 +196,7 @@ fn sensitivities<const N: usize>(samples: &[[[f64; 2]; N]], value: impl Fn(&[[f6
     std::array::from_fn(|j| {
         let mut stretched = best.1;
         stretched[j] = stretched[j].map(|x| x * (1.0 + STRETCH));
-        ((value(&stretched) - best.0) / (STRETCH * best.0)).max(0.0)
+        if best.0 > 0.0 { ((value(&stretched) - best.0) / (STRETCH * best.0)).max(0.0) } else { 0.0 }
     })
 }
 

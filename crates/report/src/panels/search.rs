@@ -32,7 +32,7 @@ pub(super) fn convergence(record: &TuningReport) -> Result<Option<TwoWidths>, Re
             phases.push((evaluation.index as f64, &evaluation.phase));
         }
     }
-    let unit = &record.asked.cost.unit;
+    let unit = &record.search.unit;
     let caption = if unit.is_empty() { "cost (no unit)".to_owned() } else { format!("cost ({unit})") };
 
     TwoWidths::new(|size| {

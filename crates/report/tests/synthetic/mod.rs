@@ -127,7 +127,7 @@ fn gain(name: &str, unit: &str, (published, tuned): (f64, f64), bounds: Option<(
 }
 
 fn assumption(text: &str, grade: Grade) -> Assumption {
-    Assumption { text: text.to_owned(), grade }
+    Assumption { text: text.to_owned(), grade: Some(grade) }
 }
 
 fn margin(name: &str, value: f64, unit: &str) -> Margin {
@@ -246,7 +246,7 @@ pub fn record() -> TuningReport {
             })
             .collect(),
         held_out: HeldOut { plants, bands: Pair { published: bands(1.1), tuned: bands(1.6) } },
-        search: SearchRecord { evaluations: evaluations(), published_cost: Some(3.42) },
+        search: SearchRecord { evaluations: evaluations(), unit: "s".to_owned(), published_cost: Some(3.42) },
         sensitivity: sensitivity
             .map(|(gain, minus, plus)| SensitivityRow {
                 gain: gain.to_owned(),

@@ -20,6 +20,7 @@
 //! [search]
 //! method = "nelder-mead"              # or "particle-swarm"
 //! start = "pezzato2020-simulation"    # optional: a preset
+//! objective = "settling-cost"         # optional: or "certified-rate", "certified-radius"
 //!
 //! [fixed]
 //! sigma_q = 1.0
@@ -175,6 +176,33 @@ pub enum Method {
     ParticleSwarm,
 }
 
+/// What a search is after.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ObjectiveName {
+    /// The least settling cost over simulated plants; its unit is s.
+    #[default]
+    SettlingCost,
+    /// The largest certified decay rate of the linearised loops; the cost is its inverse, s.
+    CertifiedRate,
+    /// The largest certified radius of the nonlinear loop; the cost is its inverse, 1/rad.
+    CertifiedRadius,
+}
+
+impl ObjectiveName {
+    /// Every objective.
+    pub const ALL: [Self; 3] = [Self::SettlingCost, Self::CertifiedRate, Self::CertifiedRadius];
+
+    /// The name as it is written in files and flags.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::SettlingCost => "settling-cost",
+            Self::CertifiedRate => "certified-rate",
+            Self::CertifiedRadius => "certified-radius",
+        }
+    }
+}
+
 /// On which scale a gain moves evenly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -266,6 +294,8 @@ enum FileController {
 struct FileSearch {
     method: Method,
     start: Option<String>,
+    #[serde(default)]
+    objective: ObjectiveName,
 }
 
 #[derive(Deserialize)]
@@ -292,6 +322,7 @@ pub enum Freedom {
 pub struct Space {
     method: Method,
     start: Option<String>,
+    objective: ObjectiveName,
     /// In the order of [`Gain::ALL`].
     freedoms: [Freedom; 7],
 }
@@ -323,7 +354,8 @@ impl Space {
                 (None, None) => return Err(SpaceError::Missing { gain }),
             };
         }
-        Self::new(file.search.method, file.search.start, freedoms)
+        let objective = file.search.objective;
+        Self::new(file.search.method, file.search.start, freedoms).map(|space| Self { objective, ..space })
     }
 
     /// A space from its parts, `freedoms` in the order of [`Gain::ALL`].
@@ -353,7 +385,7 @@ impl Space {
         if scaled.clone().all(|(_, freedom)| free(freedom)) {
             return Err(SpaceError::Redundant);
         }
-        Ok(Self { method, start, freedoms })
+        Ok(Self { method, start, objective: ObjectiveName::default(), freedoms })
     }
 
     /// The method that the file asks for.
@@ -365,6 +397,11 @@ impl Space {
     #[must_use]
     pub fn with_method(self, method: Method) -> Self {
         Self { method, ..self }
+    }
+
+    /// What the file asks the search to be after; the settling cost unless it says otherwise.
+    pub const fn objective(&self) -> ObjectiveName {
+        self.objective
     }
 
     /// The name of the preset at which the search starts.

@@ -1,22 +1,53 @@
 //! The kinds of claims. Each file holds what one kind states, its words, and its proof.
 
+mod adaptive_convergence;
+mod adaptive_sampled;
+mod disturbance;
+mod energy;
 mod exponential;
+mod joint_region;
+mod lyapunov;
+mod moving_goal;
 mod not_proved;
+mod pi_exponential;
 mod refused;
 mod region;
+mod sampled;
+mod sampled_motion;
+mod sampled_region;
+mod variation;
 
 use num_rational::BigRational;
 use serde::{Deserialize, Serialize};
 
-use crate::algebra::{Matrix, positive_definite_pivots};
+use crate::algebra::{Matrix, positive_definite_pivots, positive_definite_rounded};
 use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
 
+pub use adaptive_convergence::{
+    AdaptiveConvergenceClaim, AdaptiveLoop, AdaptiveRefusedClaim, AdaptiveWitness, adaptive_inequalities,
+};
+pub use adaptive_sampled::{AdaptiveSampledClaim, AdaptiveSampledRefusedClaim};
+pub use disturbance::{DisturbanceClaim, DisturbanceWitness, DisturbedArm, disturbance_inequalities};
+pub use energy::{Energy, Plant, Point, State, TRIANGLE, triangle};
+pub(crate) use exponential::in_words;
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
+pub use joint_region::{
+    CoveredSteps, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights, joint_region_inequalities,
+};
+pub use lyapunov::{LyapunovClaim, LyapunovRefusedClaim, LyapunovWitness, PlaneRegion, Polytope};
+pub use moving_goal::{GoalList, ListedGoal, MovingGoalClaim, moving_goal_inequalities};
 pub use not_proved::{NotProvedClaim, Reason};
+pub use pi_exponential::{PiExponentialClaim, PiRefusedClaim, pi_inequalities};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
-pub use region::{RegionClaim, RegionWitness, region_inequalities};
+pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
+pub use sampled::{LoopTiming, SampledClaim};
+pub use sampled_motion::{Coordinates, Corner, Reach, SampledLoop, SampledUnknowns};
+pub use sampled_region::{
+    Compensation, SampledRegionClaim, SampledRegionWitness, Sampling, sampled_loop, sampled_region_inequalities,
+};
+pub use variation::{Quantity, Variation};
 
 /// What an entry of a document claims.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,8 +55,34 @@ pub use region::{RegionClaim, RegionWitness, region_inequalities};
 pub enum Claim {
     /// Every linearised loop of the family decays at a rate.
     Exponential(ExponentialClaim),
+    /// Every linearised loop of the family decays when the controller is sampled and delayed.
+    Sampled(Box<SampledClaim>),
     /// The nonlinear loop decays from every start in a ball.
     Region(Box<RegionClaim>),
+    /// The adaptive loop's error converges.
+    AdaptiveConvergence(Box<AdaptiveConvergenceClaim>),
+    /// No function of the form that `adaptive-convergence` needs falls.
+    AdaptiveRefused(Box<AdaptiveRefusedClaim>),
+    /// The adaptive loop decays when its adaptation is frozen.
+    PiExponential(Box<PiExponentialClaim>),
+    /// It does not, for one joint and inertia.
+    PiRefused(Box<PiRefusedClaim>),
+    /// The adaptive loop's velocity loop survives sampling and delay.
+    AdaptiveSampled(Box<AdaptiveSampledClaim>),
+    /// It does not, because of one joint.
+    AdaptiveSampledRefused(Box<AdaptiveSampledRefusedClaim>),
+    /// The same with gains, frictions and limits of each joint.
+    JointRegion(Box<JointRegionClaim>),
+    /// The state stays in the region of an earlier entry while the goal moves.
+    MovingGoal(Box<MovingGoalClaim>),
+    /// The sampled nonlinear loop decays from every start in a ball.
+    SampledRegion(Box<SampledRegionClaim>),
+    /// Every matrix of a polytope has its eigenvalues in a region.
+    Lyapunov(Box<LyapunovClaim>),
+    /// One of them has not.
+    LyapunovRefused(Box<LyapunovRefusedClaim>),
+    /// The error stays bounded under bounded noise and pushes.
+    Disturbance(Box<DisturbanceClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
     Refused(Box<RefusedClaim>),
     /// A claim for which no proof was found, and no counterexample either.
@@ -36,7 +93,20 @@ impl Claim {
     pub(crate) fn provable(&self) -> &dyn Provable {
         match self {
             Self::Exponential(claim) => claim,
+            Self::Sampled(claim) => claim.as_ref(),
             Self::Region(claim) => claim.as_ref(),
+            Self::AdaptiveConvergence(claim) => claim.as_ref(),
+            Self::AdaptiveRefused(claim) => claim.as_ref(),
+            Self::PiExponential(claim) => claim.as_ref(),
+            Self::PiRefused(claim) => claim.as_ref(),
+            Self::AdaptiveSampled(claim) => claim.as_ref(),
+            Self::AdaptiveSampledRefused(claim) => claim.as_ref(),
+            Self::JointRegion(claim) => claim.as_ref(),
+            Self::MovingGoal(claim) => claim.as_ref(),
+            Self::SampledRegion(claim) => claim.as_ref(),
+            Self::Lyapunov(claim) => claim.as_ref(),
+            Self::LyapunovRefused(claim) => claim.as_ref(),
+            Self::Disturbance(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
         }
@@ -50,9 +120,23 @@ impl Claim {
     /// What a checked entry of this kind amounts to.
     pub fn verdict(&self) -> Verdict {
         match self {
-            Self::Refused(_) => Verdict::Refused,
+            Self::Refused(_)
+            | Self::AdaptiveRefused(_)
+            | Self::PiRefused(_)
+            | Self::AdaptiveSampledRefused(_)
+            | Self::LyapunovRefused(_) => Verdict::Refused,
             Self::NotProved(_) => Verdict::NotProved,
-            Self::Exponential(_) | Self::Region(_) => Verdict::Holds,
+            Self::Exponential(_)
+            | Self::Sampled(_)
+            | Self::Region(_)
+            | Self::JointRegion(_)
+            | Self::MovingGoal(_)
+            | Self::SampledRegion(_)
+            | Self::Disturbance(_)
+            | Self::AdaptiveConvergence(_)
+            | Self::PiExponential(_)
+            | Self::AdaptiveSampled(_)
+            | Self::Lyapunov(_) => Verdict::Holds,
         }
     }
 
@@ -86,9 +170,26 @@ pub enum ClaimKind {
     AdaptiveConvergence,
     /// The adaptive loop decays when its adaptation is frozen.
     PiExponential,
+    /// The adaptive loop's velocity loop survives sampling and delay.
+    AdaptiveSampled,
 }
 
 impl ClaimKind {
+    /// Every kind.
+    pub const ALL: [Self; 11] = [
+        Self::Exponential,
+        Self::Sampled,
+        Self::Region,
+        Self::JointRegion,
+        Self::SampledRegion,
+        Self::MovingGoal,
+        Self::Disturbance,
+        Self::Lyapunov,
+        Self::AdaptiveConvergence,
+        Self::PiExponential,
+        Self::AdaptiveSampled,
+    ];
+
     /// The name as it is written in files and flags.
     pub fn name(self) -> &'static str {
         match self {
@@ -102,6 +203,7 @@ impl ClaimKind {
             Self::Lyapunov => "lyapunov",
             Self::AdaptiveConvergence => "adaptive-convergence",
             Self::PiExponential => "pi-exponential",
+            Self::AdaptiveSampled => "adaptive-sampled",
         }
     }
 }
@@ -128,6 +230,9 @@ pub struct Figure {
     pub unit: &'static str,
 }
 
+/// Rational LDL' of dyadic matrices is quick up to this order.
+const LARGEST_EXACT_ORDER: usize = 12;
+
 /// A positive definite matrix of a proof, with the smallest pivot of its LDL'.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inequality {
@@ -143,6 +248,15 @@ impl Inequality {
     /// Decides by exact LDL' whether the matrix is positive definite.
     pub(crate) fn decide(name: String, matrix: &Matrix) -> Self {
         let smallest_pivot = positive_definite_pivots(matrix).and_then(|pivots| pivots.into_iter().min());
+        Self { name, order: matrix.len(), smallest_pivot }
+    }
+
+    /// The same for a matrix of any order: beyond [`LARGEST_EXACT_ORDER`] by the integers just below an equilibrated matrix.
+    pub(crate) fn decide_large(name: String, matrix: &Matrix) -> Self {
+        if matrix.len() <= LARGEST_EXACT_ORDER {
+            return Self::decide(name, matrix);
+        }
+        let smallest_pivot = positive_definite_rounded(matrix).and_then(|pivots| pivots.into_iter().min());
         Self { name, order: matrix.len(), smallest_pivot }
     }
 }

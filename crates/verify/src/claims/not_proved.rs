@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::refused::check_remedies;
+use super::sampled::{LoopTiming, milliseconds};
+use super::variation::{Variation, would_be_stable};
 use super::{ClaimKind, Inequality, Provable};
 use crate::document::Document;
 use crate::error::Flaw;
@@ -14,10 +17,14 @@ use crate::quantity::require_plain;
 pub struct NotProvedClaim {
     /// Which claim was attempted.
     pub of: ClaimKind,
+    /// How the loop was to be sampled, when the claim was `sampled`.
+    pub sampling: Option<LoopTiming>,
     /// How far the inequalities are from feasible in the solver's units; positive is infeasible.
     pub distance: Option<Number>,
     /// Why no proof was attempted or found.
     pub reason: Reason,
+    /// Changes of the family with which every linearised loop is stable, each checked exactly.
+    pub remedies: Vec<Variation>,
 }
 
 /// Why there is neither a proof nor a counterexample.
@@ -30,6 +37,8 @@ pub enum Reason {
     OtherController,
     /// The proof needs a constant that is not known for this family.
     ConstantMissing,
+    /// The released code's adaptation is not the one of the equations.
+    ReleasedCode,
     /// The proof does not cover families of this kind.
     FamilyNotCovered,
     /// Stable, but too slowly for the rates that are tried.
@@ -53,6 +62,10 @@ impl Reason {
             Self::UnequalGains => "this claim needs the same gains on every joint",
             Self::OtherController => "this claim is about the other controller",
             Self::ConstantMissing => "the proof needs a constant that is not known for this family",
+            Self::ReleasedCode => {
+                "in the released code the integrals of the adaptation lack the step and K1 reads the sum of K0: the adaptive blocks are not lossless, \
+                 and the proof does not apply"
+            }
             Self::FamilyNotCovered => "the proof does not cover families of this kind",
             Self::TooSlow => "the loops of the box are stable, but at no rate of at least 0.001 per s",
             Self::NoPointFound => "the box is not shown stable, and no unstable point of it was found",
@@ -79,14 +92,24 @@ impl Provable for NotProvedClaim {
             .as_ref()
             .map(|d| format!(" Distance to feasibility: {d} in the solver's units."))
             .unwrap_or_default();
-        format!("Not proved ({}): {}.{distance}", self.of.name(), self.reason.in_words())
+        let sampled = self
+            .sampling
+            .as_ref()
+            .map(|s| format!(", {}, with delays up to {} ms", s.in_words(), milliseconds(&s.delay_s)))
+            .unwrap_or_default();
+        let remedies = would_be_stable(&self.remedies);
+        format!("Not proved ({}{sampled}): {}.{distance}{remedies}", self.of.name(), self.reason.in_words())
     }
 
     fn scope(&self, _: &Document) -> String {
         String::new()
     }
 
-    fn prove(&self, _: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
+    fn prove(&self, document: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
+        if let Some(sampling) = &self.sampling {
+            sampling.check()?;
+        }
+        check_remedies(document, self.of, self.sampling.as_ref(), &self.remedies)?;
         if let Some(distance) = &self.distance {
             require_plain("distance", distance)?;
         }
