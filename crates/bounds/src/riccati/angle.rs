@@ -19,7 +19,7 @@ pub(crate) struct Arc {
     pub sine: f64,
     /// At least the tangent of half the half-width.
     pub tau: f64,
-    /// Half-width, rad; at most 1.1.
+    /// Half-width, rad; at most 1.
     pub half_width: f64,
 }
 
@@ -41,23 +41,23 @@ pub(crate) fn sine_cosine(angle: f64) -> (f64, f64) {
 }
 
 impl Arc {
-    /// The arc around the `index`-th of so many equal parts of `[lower, upper]`; all parts together cover it.
+    /// The arc around the `index`-th of `2^depth` equal parts of `[lower, upper]`; all parts together cover it.
     ///
-    /// Both ends within 8 rad of zero and the part at most 2.2 rad wide, or nothing is returned.
-    pub fn part(lower: f64, upper: f64, parts: u32, index: u64) -> Option<Self> {
-        let parts = f64::from(parts);
+    /// Both ends within 8 rad of zero and the part at most 2 rad wide, or nothing is returned.
+    pub fn part(lower: f64, upper: f64, depth: u32, index: u64) -> Option<Self> {
+        let parts = f64::from(1_u32.checked_shl(depth)?);
         #[expect(clippy::cast_precision_loss, reason = "index < 2^32")]
         let place = (2 * index + 1) as f64;
         let width = upper - lower;
         let middle = lower + width * place / (2.0 * parts);
         // The roundings of the middle and of the width stay below 8 u * 16 rad.
         let half_width = width / (2.0 * parts) * (1.0 + 1e-12) + 1e-13;
-        if !(lower.abs() <= 8.0 && upper.abs() <= 8.0 && half_width <= 1.1) {
+        if !(lower.abs() <= 8.0 && upper.abs() <= 8.0 && half_width <= 1.0) {
             return None;
         }
         let (sine, cosine) = sine_cosine(middle);
         let (half_sine, half_cosine) = sine_cosine(0.5 * half_width);
-        // Cosine >= 0.85 here, so that the quotient is off by less than 3 TRIG_ERROR.
+        // Cosine >= 0.87 here, so that the quotient is off by less than 3 TRIG_ERROR.
         let tau = half_sine / half_cosine + 4.0 * TRIG_ERROR;
         Some(Self { cosine, sine, tau, half_width })
     }

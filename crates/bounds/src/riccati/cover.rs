@@ -1,7 +1,7 @@
 //! Branch and bound: a box of angles is cut until a form is positive on every piece.
 //!
-//! A box is one of so many equal parts of each joint's interval. A box that is not settled is cut across the angle whose width cost
-//! most: into three at the first cut of an interval wider than 4.4 rad, in two otherwise. The tree of cuts depends on nothing but the arm, the set and the form, so the count of boxes is the
+//! A box is one part of `2^depth` equal parts of each joint's interval. A box that is not settled is cut in two across the angle whose
+//! width cost most. The tree of cuts depends on nothing but the arm, the set and the form, so the count of boxes is the
 //! same for any number of threads; a budget on it decides in the same way.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -88,26 +88,15 @@ impl<const N: usize> Cover<'_, N> {
                 return None;
             }
         };
-        let pieces = if cell.depth[across] == 0 { self.first_cut(across) } else { 2 };
-        let run = |piece: u32| {
+        let child = |half: u64| {
             let mut child = *cell;
             child.depth[across] += 1;
-            child.index[across] = u64::from(pieces) * cell.index[across] + u64::from(piece);
-            self.settle(&child, cuts + 1, share / f64::from(pieces))
+            child.index[across] = 2 * cell.index[across] + half;
+            child
         };
-        let last = || if pieces == 3 { run(2) } else { Some(0) };
-        let (first, rest) = if cuts < SHARED_CUTS {
-            rayon::join(|| run(0), || rayon::join(|| run(1), last))
-        } else {
-            (run(0), (run(1), last()))
-        };
-        Some(first?.max(rest.0?).max(rest.1?))
-    }
-
-    /// Pieces that the first cut of a joint's interval makes.
-    fn first_cut(&self, joint: usize) -> u32 {
-        let [lower, upper] = self.set[joint];
-        if upper - lower > 4.4 { 3 } else { 2 }
+        let run = |half: u64| self.settle(&child(half), cuts + 1, 0.5 * share);
+        let (left, right) = if cuts < SHARED_CUTS { rayon::join(|| run(0), || run(1)) } else { (run(0), run(1)) };
+        Some(left?.max(right?))
     }
 
     /// Settled, or the angle to cut; no angle if the form is violated.
@@ -115,9 +104,7 @@ impl<const N: usize> Cover<'_, N> {
         let mut arcs = [Arc { cosine: 1.0, sine: 0.0, tau: 0.0, half_width: 0.0 }; N];
         for joint in 1..N {
             let [lower, upper] = self.set[joint];
-            let depth = cell.depth[joint];
-            let parts = if depth == 0 { 1 } else { self.first_cut(joint) << (depth - 1) };
-            match Arc::part(lower, upper, parts, cell.index[joint]) {
+            match Arc::part(lower, upper, cell.depth[joint], cell.index[joint]) {
                 Some(arc) => arcs[joint] = arc,
                 None => return Err(Some(joint)),
             }

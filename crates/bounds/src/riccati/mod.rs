@@ -79,7 +79,7 @@ pub struct CoverSize {
     pub payload_end: usize,
     /// Boxes of angles tested.
     pub boxes: u64,
-    /// Most cuts of one angle's interval: the first makes two or three parts, every other halves one.
+    /// Most cuts of one angle's interval: the smallest box is `2^-cuts` of it.
     pub cuts: u32,
 }
 
