@@ -15,18 +15,18 @@
 //! # The proof, and where it is
 //! | step | where |
 //! |------|-------|
-//! | positive definite over a box of angles and all masses <= a recursion of 6x6 Loewner bounds, one angle at a time | [`forms`] |
-//! | a matrix below a form over an arc: five control matrices, no remainder | [`turn`] |
-//! | which arm is meant; velocities a link can have at all | [`chain`] |
-//! | every set of angles is covered by the parts of its intervals | [`angle`], [`cover`] |
-//! | rounding: matrices with a rigorous radius; definiteness by Cholesky with the a-priori error bound | [`ball`] |
-//! | candidates, from sampling; nothing rests on them | [`guess`] |
+//! | positive definite over a box of angles and all masses <= a recursion of 6x6 Loewner bounds, one angle at a time | `forms.rs` |
+//! | a matrix below a form over an arc: five control matrices, no remainder | `turn.rs` |
+//! | which arm is meant; velocities a link can have at all | `chain.rs` |
+//! | every set of angles is covered by the parts of its intervals | `angle.rs`, `cover.rs` |
+//! | rounding: matrices with a rigorous radius; definiteness by Cholesky with the a-priori error bound | `ball.rs` |
+//! | candidates, from sampling; nothing rests on them | `guess.rs` |
 //!
 //! A plan ([`RiccatiPlan`]) lists the numbers claimed; [`riccati_bounds_with`] proves them again and gives the same result to the bit for
 //! any number of threads, since the tree of boxes depends on the arm, the set and the plan alone.
 //!
 //! Limits: at least the least masses of the box must make M positive definite; link masses that are uncertain by a share x cost up to
-//! `sqrt((1+x)/(1-x))` in k (see [`forms`]); the proof takes 10 to 100 microseconds times the boxes, whose number grows steeply
+//! `sqrt((1+x)/(1-x))` in k (see `forms.rs`); the proof takes 10 to 100 microseconds times the boxes, whose number grows steeply
 //! as a candidate nears the truth.
 
 mod angle;
@@ -104,8 +104,9 @@ pub enum Inequality {
 /// Proved bounds of every arm of `arms` over `set`.
 ///
 /// Candidates are taken from a sample and tightened until a proof would take more boxes than `effort` allows. `progress` hears the
-/// share that is done, from any thread. Deterministic; runs on the current rayon pool. Cost: seconds to a minute
-/// (`Quick`), minutes (`Standard`), half an hour (`Thorough`) for seven joints.
+/// share that is done, from any thread; it starts afresh with every candidate. Deterministic; runs on the current rayon pool.
+/// Cost for seven joints: seconds for a box of some tenths of a radian, up to two minutes of a core for all angles (`Quick`), ten times that
+/// (`Standard`), a hundred times (`Thorough`).
 ///
 /// # Errors
 /// An interval of angles that is none; [`BoundsError::NotProved`] names the first number for which even the loosest candidate fails.
