@@ -190,7 +190,7 @@ fn certificate<const N: usize>(
         Gains::Aic(table) => source.aic_gains::<N>(table, STEP_S)?.into(),
         Gains::Mrac(table) => (*source.mrac_params::<N>(table, STEP_S)?.gains()).into(),
     };
-    let request = Request {
+    let mut request = Request {
         claims: args.claims.clone(),
         delay_samples: args.delay,
         torque_limits: args.torque_limits.unwrap_or_default(),
@@ -203,6 +203,7 @@ fn certificate<const N: usize>(
             .map(goals),
         ..Request::default()
     };
+    request.effort.proofs.sampled_region.delay_samples = 0;
     let progress = Terminal::new(context.verbose);
     let certifier = ArmCertifier::<N>::new(robot, &family_of(plant_box)?)?.with_records(records, over)?;
     match certifier.record() {

@@ -175,8 +175,12 @@ impl<const N: usize> ArmCertifier<N> {
     /// The search as the request wants it.
     fn options(&self, request: &Request) -> Result<Options, StabilityError> {
         let mut options = request.effort.proofs.clone();
+        options.sampled.period_s = STEP_S;
         options.sampled_region.step_s = STEP_S;
-        options.sampled_region.delay_samples = request.delay_samples.unwrap_or(0);
+        if let Some(samples) = request.delay_samples {
+            options.sampled.delay_samples = samples;
+            options.sampled_region.delay_samples = samples;
+        }
         match request.torque_limits {
             TorqueLimits::None => {}
             TorqueLimits::Norm(limit) => {

@@ -47,8 +47,8 @@ impl Default for Effort {
 pub struct Request {
     /// The claims, in this order; empty for all that apply to the gains ([`claims_for`]).
     pub claims: Vec<ClaimKind>,
-    /// Samples from a command to its torque, for the claims about the sampled loop; 0 without one, and `moving-goal` then speaks of continuous
-    /// time.
+    /// Samples from a command to its torque, for the claims about the sampled loop; `None` leaves them as the effort has them, and `moving-goal`
+    /// speaks of continuous time.
     pub delay_samples: Option<usize>,
     /// Torque limits, for the claims that can respect some.
     pub torque_limits: TorqueLimits,
@@ -74,6 +74,7 @@ pub fn claims_for<const N: usize>(gains: &ArmGains<N>) -> Vec<ClaimKind> {
     match gains {
         ArmGains::Aic(_) if gains.are_shared() => vec![
             ClaimKind::Exponential,
+            ClaimKind::Sampled,
             ClaimKind::Region,
             ClaimKind::MovingGoal,
             ClaimKind::SampledRegion,
