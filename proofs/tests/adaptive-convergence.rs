@@ -7,9 +7,9 @@ use certune::certify::FamilyValues;
 use certune::control::mrac::{MracGains, MracLaw};
 use certune::dynamics::{Model, Robot, State, coriolis_torque, mass_matrix};
 use certune::linsys::{JointMatrix, Joints};
-use certune::verify::{Certificate, Claim, ClaimKind, Grade, Number, Reason, checked_alone};
+use certune::verify::{Certificate, Claim, ClaimKind, Number, Reason, checked_alone};
 use certune::{AdaptiveSetting, ArmCertifier};
-use proofs::{A, B, C, nominal_family, published_mrac, stored};
+use proofs::{A, B, C, asked_mrac, grade, nominal_family, published_mrac, stored_with_records};
 
 /// Friction 0 to 3 N m s/rad, nominal masses.
 static NOMINAL: LazyLock<ArmCertifier<7>> = LazyLock::new(|| certifier(&nominal_family(true, [0.0, 3.0])));
@@ -57,11 +57,22 @@ fn masses_and_payloads_are_covered_too() {
 
 #[test]
 fn the_stored_certificate_is_the_one_derived() {
-    let derived = convergence(&NOMINAL, &simulation(MracLaw::ReferenceModel), B);
-    let stored = stored("adaptive-convergence", &derived).unwrap();
+    let family = nominal_family(true, [0.0, 3.0]);
+    let derive = |gains| asked_mrac(gains, &family, ClaimKind::AdaptiveConvergence, B, 0).unwrap();
+    let derived = derive(simulation(MracLaw::ReferenceModel));
+    let stored = stored_with_records("adaptive-convergence", &derived).unwrap();
     assert!(stored.all_hold());
-    assert_eq!(stored.document().arm, derived.document().arm);
-    assert_eq!(stored.checked()[0].grade, Some(Grade::Conditional), "sampled constants prove nothing");
+    assert_eq!(stored.document().arm, derived.certificate.document().arm);
+    assert_eq!(stored.checked()[0].grade, Some(grade(&stored)));
+    let derived = derive(published_mrac("simulation").unwrap());
+    let released = stored_with_records("adaptive-convergence--released-code", &derived).unwrap();
+    assert_eq!(released.checked()[0].statement, derived.certificate.checked()[0].statement);
+    assert!(released.checked()[0].statement.contains("lack the step"));
+    let robot = MracGains { law: MracLaw::RawGoal, ..published_mrac("robot").unwrap() };
+    let derived =
+        asked_mrac(robot, &nominal_family(true, [0.0, 0.0]), ClaimKind::AdaptiveConvergence, B, 0).unwrap();
+    let refused = stored_with_records("adaptive-convergence--robot", &derived).unwrap();
+    assert!(matches!(refused.document().claims[0].claim, Claim::AdaptiveRefused(_)));
 }
 
 #[test]
@@ -70,7 +81,8 @@ fn the_robot_gains_are_refused() {
     let arm = &certifier(&nominal_family(true, [0.0, 0.0]));
     // At B and C every function of the form rises along a velocity; at A only the Coriolis term is too dear.
     for (goal, refuted) in [(A, false), (B, true), (C, true)] {
-        match &convergence(arm, &gains, goal).document().claims[0].claim {
+        let certificate = convergence(arm, &gains, goal);
+        match &certificate.document().claims[0].claim {
             Claim::AdaptiveRefused(_) => assert!(refuted),
             Claim::NotProved(claim) => {
                 assert!(!refuted && claim.reason == Reason::Infeasible);

@@ -3,10 +3,9 @@
 
 use certune::certify::{DisturbanceOptions, Options, to_json};
 use certune::control::aic::AicGains;
-use certune::dynamics::Robot;
 use certune::verify::{Certificate, Claim, ClaimKind, DisturbanceClaim, Number, seal, verify};
-use certune::{ArmCertifier, Effort};
-use proofs::{nominal_family, stored};
+use certune::Effort;
+use proofs::{nominal_family, panda, records, stored};
 
 const QUIET: DisturbanceOptions = DisturbanceOptions {
     position_noise_rad: 0.0,
@@ -27,7 +26,7 @@ fn derive(disturbance: DisturbanceOptions, compensated: bool) -> Certificate {
         reference_time_constant_s: [1.0; 7],
     };
     let effort = Effort { proofs: Options { disturbance, ..Options::default() }, ..Effort::default() };
-    let certifier = ArmCertifier::<7>::new(&Robot::panda(), &nominal_family(compensated, [1.0, 3.0])).unwrap();
+    let certifier = panda(&nominal_family(compensated, [1.0, 3.0])).unwrap();
     certifier.certify_with(&gains, &[ClaimKind::Disturbance], &effort).unwrap()
 }
 
@@ -77,7 +76,7 @@ fn louder_noise_and_tighter_bounds_are_rejected() {
         let mut document = stored.document().clone();
         let Claim::Disturbance(claim) = &mut document.claims[0].claim else { panic!("a disturbance") };
         edit(claim);
-        verify(&to_json(&seal(document)).unwrap(), &[]).unwrap().is_err()
+        verify(&to_json(&seal(document)).unwrap(), &records().unwrap()).unwrap().is_err()
     };
     let scaled = |number: &Number, share: f64| Number::decimal(number.to_f64() * share).unwrap();
     assert!(!rejected(&|_| {}), "unchanged, it stands");

@@ -1,25 +1,12 @@
 //! `claims/lyapunov.md` on the Panda: the authors' gains retuned joint by joint, linearised at the task's goals, 42 states.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
-use std::path::Path;
-
-use certune::ArmCertifier;
-use certune::closed_loop::{Gains, GainsFile};
-use certune::control::aic::AicGains;
-use certune::dynamics::Robot;
 use certune::verify::{Certificate, Claim, LyapunovWitness, Number, PlaneRegion, checked_alone};
-use proofs::{A, B, C, nominal_family, stored};
-
-fn retuned() -> AicGains<7> {
-    let text = include_str!("../../tuning/presets/pezzato2020-robot.toml");
-    let file = GainsFile::parse(Path::new("pezzato2020-robot.toml"), text).unwrap();
-    let Gains::Aic(table) = file.gains else { panic!("not the AIC") };
-    table.bind::<7>().unwrap()
-}
+use proofs::{A, B, C, nominal_family, panda, published_aic, stored};
 
 fn certificate(goal: [f64; 7], friction: f64) -> Certificate {
-    let arm = ArmCertifier::<7>::new(&Robot::panda(), &nominal_family(true, [friction; 2])).unwrap();
-    arm.certify_at(&retuned(), goal).unwrap()
+    let arm = panda(&nominal_family(true, [friction; 2])).unwrap();
+    arm.certify_at(&published_aic("robot").unwrap(), goal).unwrap()
 }
 
 fn rate(certificate: &Certificate) -> f64 {

@@ -1,10 +1,11 @@
 //! `claims/sampled.md` on the Panda: the published simulation gains at 1 kHz, gravity compensated, friction 1 to 3 N m s/rad.
-#![expect(clippy::panic, reason = "test helpers")]
+#![expect(clippy::panic, clippy::unwrap_used, reason = "test helpers")]
 
+use certune::Request;
 use certune::verify::{Certificate, Claim, ClaimKind, Number, SampledClaim, SampledFamily, family_box};
 use num_rational::BigRational;
 use num_traits::Zero;
-use proofs::{nominal_family, published, stored};
+use proofs::{asked, nominal_family, published, stored};
 
 fn claim(certificate: &Certificate) -> &SampledClaim {
     match &certificate.document().claims[0].claim {
@@ -42,4 +43,19 @@ fn one_more_sample_is_refused() {
     assert!(loops.decays_on(timing.plant, &range, &two, &zero).is_err());
     let light: &Number = &range.inertia[0];
     assert!(loops.fails_at(timing.plant, [light.value(), range.friction[0].value(), &zero], 2, &zero));
+}
+
+/// What the light-inertia rule predicts (`claims/sampled.md`): delay takes its damping from somewhere, and the bare arm has none.
+#[test]
+fn without_friction_one_sample_of_delay_is_refused() {
+    let request = Request { claims: vec![ClaimKind::Sampled], delay_samples: Some(1), ..Request::default() };
+    let derived = asked("simulation", &nominal_family(true, [0.0, 0.0]), &request).unwrap();
+    let stored = stored("sampled--delay-without-friction", &derived).unwrap();
+    for certificate in [&derived, &stored] {
+        let Claim::Refused(refused) = &certificate.document().claims[0].claim else {
+            panic!("{}", certificate.checked()[0].statement)
+        };
+        assert_eq!(refused.sampling.as_ref().unwrap().delay_s.to_string(), "0.001");
+        assert!(refused.attained.is_some() && !refused.remedies.is_empty(), "{refused:?}");
+    }
 }

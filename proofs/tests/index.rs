@@ -1,0 +1,39 @@
+//! `README.md`'s list of certificates is the one read from them.
+#![expect(clippy::unwrap_used, reason = "test helpers")]
+
+use std::path::{Path, PathBuf};
+
+use proofs::index::{INDEX, table};
+
+const BEFORE: &str = "<!-- certificates, written by `cargo xtask claims` -->\n";
+const AFTER: &str = "<!-- end of certificates -->\n";
+
+fn at(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+#[test]
+fn the_page_says_what_the_certificates_say() {
+    let page = std::fs::read_to_string(at("README.md")).unwrap();
+    let (head, rest) = page.split_once(BEFORE).unwrap();
+    let (listed, tail) = rest.split_once(AFTER).unwrap();
+    let table = table().unwrap();
+    if std::env::var_os("CERTUNE_WRITE_CLAIMS").is_some() {
+        std::fs::write(at("README.md"), format!("{head}{BEFORE}{table}{AFTER}{tail}")).unwrap();
+    } else {
+        assert_eq!(listed, table, "write it again with `cargo xtask claims`");
+    }
+}
+
+#[test]
+fn every_certificate_is_listed_once() {
+    let mut files: Vec<String> = std::fs::read_dir(at("certificates"))
+        .unwrap()
+        .map(|entry| entry.unwrap().path().file_stem().unwrap().to_str().unwrap().to_owned())
+        .collect();
+    let mut listed = INDEX.map(|(name, _)| name.to_owned()).to_vec();
+    files.sort();
+    listed.sort();
+    assert_eq!(files, listed);
+    assert!(INDEX.len() >= 10);
+}
