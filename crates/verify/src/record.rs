@@ -58,6 +58,11 @@ impl Record {
         if record.schema != SCHEMA {
             return Err(VerifyError::Schema { found: record.schema, expected: SCHEMA });
         }
+        // One record, one text, as for a document.
+        let written: serde_json::Value = serde_json::from_str(text)?;
+        if serde_json::to_value(&record)? != written {
+            return Ok(Err(Rejection::Form));
+        }
         let computed = record.hash();
         if computed != record.sha256 {
             return Ok(Err(Rejection::Hash { computed, written: record.sha256 }));
