@@ -23,7 +23,7 @@ use crate::values::{
 const AFTER_HELP: &str = "\
 Examples:
   autotune --robot panda                            tune, certify and report, in under a minute
-  autotune certify --robot panda --gains pezzato2020-simulation
+  autotune certify --robot panda --gains pezzato2020-simulation --gravity-compensation on --friction 1..3
   autotune verify runs/panda-aic-1/certificate.json
   autotune presets                                  what --gains knows by name
 
@@ -157,7 +157,7 @@ pub struct CertifyArgs {
     /// Claims to examine, by name, separated by commas [default: all that apply to the controller]
     #[arg(long = "claim", value_name = "NAME", value_parser = claim, value_delimiter = ',')]
     pub claims: Vec<ClaimKind>,
-    /// Samples from a command to its torque, for the claims about the sampled loop [default: 0]
+    /// Samples from a command to its torque, for the claims about the sampled loop, and for moving-goal when it is named [default: 0]
     #[arg(long, value_name = "K", value_parser = delay, allow_hyphen_values = true)]
     pub delay: Option<usize>,
     /// Respect torque limits: the arm's own less gravity's share, or, with a number, this 2-norm of the controller's torque
