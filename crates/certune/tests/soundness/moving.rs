@@ -36,7 +36,7 @@ fn gains(kappa_a: f64) -> AicGains<N> {
 }
 
 fn scenario() -> Scenario {
-    let text = include_str!("../../../tuning/scenarios/pick-and-place.toml");
+    let text = include_str!("../../../../tuning/scenarios/pick-and-place.toml");
     Scenario::parse(Path::new("pick-and-place.toml"), text).unwrap()
 }
 
