@@ -1,6 +1,8 @@
 //! `claims/adaptive-convergence.md` on the Panda: the published MRAC gains with the paper's equations, at the goals of the task.
 #![expect(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
+use std::sync::LazyLock;
+
 use certune::certify::FamilyValues;
 use certune::control::mrac::{MracGains, MracLaw};
 use certune::dynamics::{Model, Robot, State, coriolis_torque, mass_matrix};
@@ -8,6 +10,9 @@ use certune::linsys::{JointMatrix, Joints};
 use certune::verify::{Certificate, Claim, ClaimKind, Grade, Number, Reason, checked_alone};
 use certune::{AdaptiveSetting, ArmCertifier};
 use proofs::{A, B, C, nominal_family, published_mrac, stored};
+
+/// Friction 0 to 3 N m s/rad, nominal masses.
+static NOMINAL: LazyLock<ArmCertifier<7>> = LazyLock::new(|| certifier(&nominal_family(true, [0.0, 3.0])));
 
 fn certifier(family: &FamilyValues) -> ArmCertifier<7> {
     ArmCertifier::new(&Robot::panda(), family).unwrap()
@@ -23,10 +28,10 @@ fn simulation(law: MracLaw) -> MracGains<7> {
 
 #[test]
 fn the_equations_converge_with_the_simulation_gains_at_every_goal() {
-    let arm = certifier(&nominal_family(true, [0.0, 3.0]));
+    let arm = &NOMINAL;
     for goal in [A, B, C] {
         for law in [MracLaw::RawGoal, MracLaw::ReferenceModel] {
-            let certificate = convergence(&arm, &simulation(law), goal);
+            let certificate = convergence(arm, &simulation(law), goal);
             assert!(certificate.all_hold(), "{}", certificate.checked()[0].statement);
             assert_eq!(certificate.checked()[0].inequalities.len(), 3);
             let figures = certificate.document().claims[0].claim.figures();
@@ -52,7 +57,7 @@ fn masses_and_payloads_are_covered_too() {
 
 #[test]
 fn the_stored_certificate_is_the_one_derived() {
-    let derived = convergence(&certifier(&nominal_family(true, [0.0, 3.0])), &simulation(MracLaw::ReferenceModel), B);
+    let derived = convergence(&NOMINAL, &simulation(MracLaw::ReferenceModel), B);
     let stored = stored("adaptive-convergence", &derived).unwrap();
     assert!(stored.all_hold());
     assert_eq!(stored.document().arm, derived.document().arm);
@@ -62,10 +67,10 @@ fn the_stored_certificate_is_the_one_derived() {
 #[test]
 fn the_robot_gains_are_refused() {
     let gains = MracGains { law: MracLaw::RawGoal, ..published_mrac("robot").unwrap() };
-    let arm = certifier(&nominal_family(true, [0.0, 0.0]));
+    let arm = &certifier(&nominal_family(true, [0.0, 0.0]));
     // At B and C every function of the form rises along a velocity; at A only the Coriolis term is too dear.
     for (goal, refuted) in [(A, false), (B, true), (C, true)] {
-        match &convergence(&arm, &gains, goal).document().claims[0].claim {
+        match &convergence(arm, &gains, goal).document().claims[0].claim {
             Claim::AdaptiveRefused(_) => assert!(refuted),
             Claim::NotProved(claim) => {
                 assert!(!refuted && claim.reason == Reason::Infeasible);
@@ -74,22 +79,22 @@ fn the_robot_gains_are_refused() {
             other => panic!("{other:?}"),
         }
     }
+    let frictional = certifier(&nominal_family(true, [1.0, 3.0]));
     for goal in [A, B, C] {
-        let frictional = certifier(&nominal_family(true, [1.0, 3.0]));
         assert!(!convergence(&frictional, &gains, goal).all_hold());
     }
 }
 
 #[test]
 fn the_released_code_is_refused_with_the_reason() {
-    let arm = certifier(&nominal_family(true, [0.0, 3.0]));
+    let arm = &NOMINAL;
     for name in ["simulation", "robot"] {
-        let certificate = convergence(&arm, &published_mrac(name).unwrap(), B);
+        let certificate = convergence(arm, &published_mrac(name).unwrap(), B);
         let checked = &certificate.checked()[0];
         assert!(checked.statement.contains("lack the step") && checked.grade.is_none(), "{}", checked.statement);
     }
     // Nor does a claim written for it pass.
-    let equations = convergence(&arm, &simulation(MracLaw::RawGoal), B);
+    let equations = convergence(arm, &simulation(MracLaw::RawGoal), B);
     let mut document = equations.document().clone();
     let certune::verify::Gains::Mrac(gains) = &mut document.gains else { panic!("not the MRAC") };
     gains.law = certune::verify::MracLaw::ReleasedCode;
@@ -98,8 +103,8 @@ fn the_released_code_is_refused_with_the_reason() {
 
 #[test]
 fn a_weaker_enclosure_or_a_larger_figure_is_not_proved() {
-    let arm = certifier(&nominal_family(true, [0.0, 3.0]));
-    let certificate = convergence(&arm, &simulation(MracLaw::RawGoal), B);
+    let arm = &NOMINAL;
+    let certificate = convergence(arm, &simulation(MracLaw::RawGoal), B);
     let document = certificate.document();
     let Claim::AdaptiveConvergence(claim) = &document.claims[0].claim else { panic!("no claim") };
     let number = |x: f64| Number::decimal(x).unwrap();
@@ -244,8 +249,8 @@ impl Draws {
 }
 
 fn certified(goal: [f64; 7]) -> (f64, f64) {
-    let arm = certifier(&nominal_family(true, [0.0, 3.0]));
-    let certificate = convergence(&arm, &simulation(MracLaw::RawGoal), goal);
+    let arm = &NOMINAL;
+    let certificate = convergence(arm, &simulation(MracLaw::RawGoal), goal);
     let Claim::AdaptiveConvergence(claim) = &certificate.document().claims[0].claim else { panic!("no claim") };
     (claim.witness.spring_n_m_per_rad[0].to_f64(), claim.level_j.to_f64())
 }

@@ -159,12 +159,12 @@ pub struct CertifyArgs {
     #[arg(long, value_name = "K", value_parser = delay, allow_hyphen_values = true)]
     pub delay: Option<usize>,
     /// Respect torque limits: the arm's own less gravity's share, or, with a number, this 2-norm of the controller's torque
-    #[arg(long, value_name = "N_M", value_parser = torque_limits, num_args = 0..=1, default_missing_value = ARMS_OWN, allow_hyphen_values = true)]
+    #[arg(long, value_name = "N_M", value_parser = torque_limits, num_args = 0..=1, default_missing_value = ARMS_OWN, allow_negative_numbers = true)]
     pub torque_limits: Option<TorqueLimits>,
     /// Configurations that the claims speak of [default: torus]
     #[arg(long, value_name = "torus|range|scenario", hide_possible_values = true)]
     pub over: Option<OverName>,
-    /// The goal of the claims about one configuration, rad, separated by commas [default: the scenario's first goal]
+    /// Configuration of the claims about one (lyapunov, and all about MRAC), rad, separated by commas [default: the scenario's first goal]
     #[arg(long, value_name = "LIST", value_parser = numbers, allow_hyphen_values = true)]
     pub at: Option<Numbers>,
     /// Claim it for every plant of this scenario's plant box, instead of the five options below

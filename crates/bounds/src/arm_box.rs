@@ -150,6 +150,11 @@ impl<const N: usize> ArmBox<N> {
         &self.groups
     }
 
+    /// The nominal arm, without payload of the box, rotor inertia and friction.
+    pub(crate) fn base(&self) -> &Model<N> {
+        &self.base
+    }
+
     /// Lower and upper rotor inertia of every joint, kg m².
     #[must_use]
     pub fn rotor_inertia_kg_m2(&self) -> [Joints<N>; 2] {
@@ -178,6 +183,39 @@ impl<const N: usize> ArmBox<N> {
             Some(&mass_kg) if mass_kg > 0.0 => model.with_payload(&point(mass_kg, self.payload_com_m)),
             _ => model,
         }
+    }
+
+    /// The arm with every mass at its upper end, without rotor inertia.
+    pub(crate) fn upper_model(&self) -> Model<N> {
+        let scales: Vec<f64> = self.groups.iter().map(|group| group.scale[1]).collect();
+        self.model_unchecked(&scales)
+    }
+
+    /// The arm with every link's mass in the middle, without rotor inertia: with the least and with the largest payload.
+    pub(crate) fn nominal_models(&self) -> Vec<Model<N>> {
+        let mut scales: Vec<f64> = self.groups.iter().map(|group| 0.5 * (group.scale[0] + group.scale[1])).collect();
+        let payload = self.groups.get(N).map_or([0.0; 2], |group| group.scale);
+        scales.truncate(N);
+        let loads = if payload[0] < payload[1] { &payload[..] } else { &payload[..1] };
+        loads.iter().map(|load| self.model_unchecked(&[&scales[..], &[*load]].concat())).collect()
+    }
+
+    /// The arms whose masses are all least, and all greatest, with the least rotor inertia.
+    pub(crate) fn corner_models(&self) -> [Model<N>; 2] {
+        [0, 1].map(|end| {
+            let scales: Vec<f64> = self.groups.iter().map(|group| group.scale[end]).collect();
+            self.model_unchecked(&scales).with_rotor_inertia(&self.rotor_lower)
+        })
+    }
+
+    /// Each link with half the width of its scale's interval.
+    pub(crate) fn uncertain_links(&self) -> impl Iterator<Item = (&MassGroup<N>, f64)> {
+        self.groups.iter().take(N).map(|group| {
+            let [lower, upper] = group.scale;
+            // Scales are of order 1: the ends and the middle are roundings of what was meant.
+            let half = if lower < upper { 0.5 * (upper - lower) + 4.0 * f64::EPSILON } else { 0.0 };
+            (group, half)
+        })
     }
 
     /// The axes of a search over members: N joint angles (full circles), then one scale per group, then one common

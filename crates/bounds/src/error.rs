@@ -64,6 +64,54 @@ pub enum BoundsError {
         /// Numbers expected.
         expected: usize,
     },
+    /// A body whose second moments are not positive semidefinite, or not provably so: the convexity that polygons rest on fails.
+    #[error("link {link}: second moments of its body (payload included) are not provably positive semidefinite")]
+    SecondMoments {
+        /// Link, counted from 1 at the base.
+        link: usize,
+    },
+    /// An interval of angles that is not ordered, or beyond what the enclosures of sine and cosine are made for.
+    #[error(
+        "angles of joint {joint} are {lower} to {upper} rad, expected lower <= upper, both within +-15 or a full turn"
+    )]
+    Angles {
+        /// Joint, counted from 1 at the base.
+        joint: usize,
+        /// Lower end, rad.
+        lower: f64,
+        /// Upper end, rad.
+        upper: f64,
+    },
+    /// Too few corners to enclose a circle or an arc, or too few angles for a polynomial of degree 2.
+    #[error("{given} pieces for one joint, expected at least {least}")]
+    Pieces {
+        /// Pieces given.
+        given: usize,
+        /// Fewest that do.
+        least: usize,
+    },
+    /// A weight of the diagonal bound that is not positive and finite.
+    #[error("weight of the diagonal bound is {value}, expected a positive, finite number")]
+    Weight {
+        /// The weight.
+        value: f64,
+    },
+    /// Enclosures of sine and cosine that came out too wide; a fault of the arithmetic, not of the input.
+    #[error("enclosure of a sine or cosine is {width} wide, expected at most 2^-42")]
+    Enclosure {
+        /// Its width.
+        width: f64,
+    },
+    /// A bound that could not be proved with the boxes allowed, or is false.
+    #[error("joint {joint} (0: the inertia): bound {claim} not proved within {boxes} boxes of angles")]
+    NotProved {
+        /// Joint whose Coriolis constant it is, counted from 1 at the base; 0 for a bound of the inertia.
+        joint: usize,
+        /// The bound tried.
+        claim: f64,
+        /// Boxes allowed.
+        boxes: u64,
+    },
     /// An axis of a search that is not a finite, ordered interval.
     #[error("search axis {axis} is {lower} to {upper}, expected lower <= upper, both finite")]
     Axis {

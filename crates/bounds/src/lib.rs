@@ -31,6 +31,9 @@
 //! statement of the form "if these constants hold", and must say so; it never counts as proved. The
 //! configuration that attains each constant is part of the result, so that anyone can re-evaluate it.
 //!
+//! Proved constants come from [`rigorous`] (upper bounds: polygons around circles, equispaced angles) and [`riccati`] (lower bounds and
+//! the relative Coriolis constants: branch and bound), and [`record()`] stores them with what proves them.
+//!
 //! [`maximise`] is the same kind of search for any score over a box, such as the spectral abscissa of a linearised loop:
 //! what it finds is a counterexample that can be checked; what it does not find proves nothing.
 //!
@@ -47,6 +50,9 @@ mod enclosure;
 mod error;
 mod maximise;
 mod quantity;
+mod record;
+pub mod riccati;
+pub mod rigorous;
 mod sampled;
 mod sequence;
 
@@ -55,4 +61,5 @@ pub use constants::{Attained, Constants, Extremes, SampledConstants, SamplingOpt
 pub use enclosure::{Enclosure, enclosure};
 pub use error::BoundsError;
 pub use maximise::{Axis, Maximum, SearchOptions, maximise};
+pub use record::{RecordError, recheck, record};
 pub use sampled::sampled_constants;

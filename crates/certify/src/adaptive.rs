@@ -203,14 +203,14 @@ pub fn pi_exponential(problem: &Problem, goal_rad: &[f64]) -> Claim {
                 let middle = certified.midpoint(refused);
                 if holds(middle) == Ok(true) { certified = middle } else { refused = middle }
             }
-            Claim::PiExponential(claim(certified))
+            Claim::PiExponential(Box::new(claim(certified)))
         }
         Ok(false) => {
             let inertia_kg_m2 = document.constants.bounds.m_hi_kg_m2.clone();
             (1..=document.arm.joints)
                 .map(|joint| {
                     let (goal_rad, inertia_kg_m2) = (goal_rad.clone(), inertia_kg_m2.clone());
-                    Claim::PiRefused(PiRefusedClaim { goal_rad, joint, inertia_kg_m2 })
+                    Claim::PiRefused(Box::new(PiRefusedClaim { goal_rad, joint, inertia_kg_m2 }))
                 })
                 .find(|claim| checked_alone(document, claim).is_ok())
                 .unwrap_or_else(|| not_proved(KIND, Reason::NoPointFound, None))
@@ -229,7 +229,7 @@ pub fn adaptive_sampled(problem: &Problem, goal_rad: &[f64], step_s: f64, delay_
         return not_proved(KIND, Reason::OutOfRange, None);
     };
     let velocity_loop = AdaptiveSampledClaim { goal_rad, step_s, delay_samples };
-    let claim = Claim::AdaptiveSampled(velocity_loop.clone());
+    let claim = Claim::AdaptiveSampled(Box::new(velocity_loop.clone()));
     let flaw = match checked_alone(document, &claim) {
         Ok(_) => return claim,
         Err(flaw) => flaw,
@@ -237,7 +237,7 @@ pub fn adaptive_sampled(problem: &Problem, goal_rad: &[f64], step_s: f64, delay_
     (1..=document.arm.joints)
         .map(|joint| {
             let velocity_loop = velocity_loop.clone();
-            Claim::AdaptiveSampledRefused(AdaptiveSampledRefusedClaim { velocity_loop, joint })
+            Claim::AdaptiveSampledRefused(Box::new(AdaptiveSampledRefusedClaim { velocity_loop, joint }))
         })
         .find(|claim| checked_alone(document, claim).is_ok())
         .unwrap_or_else(|| match flaw {

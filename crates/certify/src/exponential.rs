@@ -1,18 +1,19 @@
 //! The largest certified decay rate of the linearised loops, or a point of the box that contradicts stability.
 
 use certune_verify::{
-    Attained, BoxPoint, Claim, ClaimKind, ExponentialClaim, LoopBox, LoopFamily, Number, Reason, RefusedClaim,
-    family_box,
+    Attained, BoxPoint, Claim, ClaimKind, Document, ExponentialClaim, LoopBox, LoopFamily, LoopTiming, NotProvedClaim,
+    Number, Reason, RefusedClaim, family_box,
 };
 use num_rational::BigRational;
 use num_traits::Zero;
 
+use crate::margins::{margins, remedies};
 use crate::problem::Problem;
 
 /// Rates are certified in steps of 1/1000 per second.
 const STEPS_PER_UNIT: u32 = 1000;
 /// No rate beyond this is tried, 1/s.
-const LARGEST_RATE_PER_S: u32 = 50;
+pub(crate) const LARGEST_RATE_PER_S: u32 = 50;
 /// Points per axis when a counterexample is searched inside the box.
 const GRID: u32 = 24;
 
@@ -35,7 +36,7 @@ fn rate(steps: u32) -> Option<Number> {
 ///
 /// `attain` searches an arm and configuration of the family with an unstable linearised loop; it is asked only after the
 /// box has been found to hold an unstable point.
-pub fn exponential(problem: &Problem, attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>) -> Claim {
+pub fn exponential(problem: &Problem, attain: &Attain<'_>) -> Claim {
     let document = problem.document();
     let range = family_box(document);
     let Ok(gains) = document.gains.aic() else {
@@ -44,67 +45,89 @@ pub fn exponential(problem: &Problem, attain: &dyn Fn() -> Option<(UnstableLoop,
     let Ok(loops) = LoopFamily::new(gains) else {
         return not_proved(Reason::UnequalGains);
     };
-    let decays = |steps: u32| rate(steps).is_some_and(|r| loops.decays_on(&range, r.value()).is_ok());
-    if !decays(1) {
-        return refuse(&loops, &range, attain);
-    }
+    let decays = |rate: &Number| loops.decays_on(&range, rate.value()).is_ok();
+    let Some(rate_per_s) = largest_rate(LARGEST_RATE_PER_S, &decays) else {
+        return refuse(document, &loops, &range, attain);
+    };
+    let zero = BigRational::zero();
+    let margins = margins(document, false, &|range| loops.decays_on(range, &zero).is_ok());
+    Claim::Exponential(ExponentialClaim { rate_per_s, margins })
+}
+
+/// The largest rate that passes, in steps of 0.001 per s below `bound`.
+pub(crate) fn largest_rate(bound: u32, decays: &dyn Fn(&Number) -> bool) -> Option<Number> {
+    let passes = |steps: u32| rate(steps).filter(decays);
+    let mut certified = (1, passes(1)?);
     // Stable at rate r implies stable at every smaller rate: bisect between a certified and a refused step.
-    let (mut certified, mut refused) = (1, STEPS_PER_UNIT * LARGEST_RATE_PER_S);
-    while refused - certified > 1 {
-        let middle = certified.midpoint(refused);
-        if decays(middle) {
-            certified = middle;
-        } else {
-            refused = middle;
+    let mut refused = STEPS_PER_UNIT * bound;
+    while refused - certified.0 > 1 {
+        let middle = certified.0.midpoint(refused);
+        match passes(middle) {
+            Some(number) => certified = (middle, number),
+            None => refused = middle,
         }
     }
-    match rate(certified) {
-        Some(rate_per_s) => Claim::Exponential(ExponentialClaim { rate_per_s }),
-        None => not_proved(Reason::OutOfRange),
-    }
+    Some(certified.1)
 }
 
 fn not_proved(reason: Reason) -> Claim {
     crate::not_proved(ClaimKind::Exponential, reason, None)
 }
 
-fn refuse(loops: &LoopFamily, range: &LoopBox, attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>) -> Claim {
+fn refuse(document: &Document, loops: &LoopFamily, range: &LoopBox, attain: &Attain<'_>) -> Claim {
     let zero = BigRational::zero();
-    if loops.decays_on(range, &zero).is_ok() {
+    let stable = |range: &LoopBox| loops.decays_on(range, &zero).is_ok();
+    if stable(range) {
         return not_proved(Reason::TooSlow);
     }
-    let unstable =
-        |point: &BoxPoint| range.contains(coordinates(point)) && !loops.is_stable_at(coordinates(point), &zero);
-    let refused = |point: BoxPoint, attained: Option<Attained>| {
-        Claim::Refused(Box::new(RefusedClaim {
+    let remedies = remedies(document, false, &stable);
+    let fails = |point: &BoxPoint| !loops.is_stable_at(coordinates(point), &zero);
+    match counterexample(range, attain(None), &fails) {
+        Ok((point, attained)) => Claim::Refused(Box::new(RefusedClaim {
             of: ClaimKind::Exponential,
+            sampling: None,
             rate_per_s: Number::zero(),
             point,
             attained,
-        }))
-    };
-    if let Some((found, attained)) = attain() {
+            remedies,
+        })),
+        Err(reason) => Claim::NotProved(NotProvedClaim {
+            of: ClaimKind::Exponential,
+            sampling: None,
+            distance: None,
+            reason,
+            remedies,
+        }),
+    }
+}
+
+/// Searches an arm and configuration of the family with an unstable linearised loop, in continuous time or sampled.
+pub type Attain<'a> = dyn Fn(Option<&LoopTiming>) -> Option<(UnstableLoop, Attained)> + 'a;
+
+/// A point of the box that fails: the one of an arm that was found, else one of a grid.
+pub(crate) fn counterexample(
+    range: &LoopBox,
+    found: Option<(UnstableLoop, Attained)>,
+    fails: &dyn Fn(&BoxPoint) -> bool,
+) -> Result<(BoxPoint, Option<Attained>), Reason> {
+    let unstable = |point: &BoxPoint| range.contains(coordinates(point)) && fails(point);
+    if let Some((found, attained)) = found {
         let values = [found.inertia_kg_m2, found.friction_n_m_s_per_rad, found.stiffness_n_m_per_rad];
-        let Some(point) = as_point(values).map(|point| pulled_inside(point, range)) else {
-            return not_proved(Reason::OutOfRange);
-        };
+        let point = as_point(values).map(|point| pulled_inside(point, range)).ok_or(Reason::OutOfRange)?;
         if !range.contains(coordinates(&point)) {
-            return not_proved(Reason::ConstantsContradicted);
+            return Err(Reason::ConstantsContradicted);
         }
         // Few digits if the loop is unstable there as well.
         let short = as_point(values.map(|x| format!("{x:.3e}").parse().unwrap_or(x)));
         if let Some(point) = short.into_iter().chain([point]).find(unstable) {
             let friction_n_m_s_per_rad = point.friction_n_m_s_per_rad.clone();
-            return refused(point, Some(Attained { friction_n_m_s_per_rad, ..attained }));
+            return Ok((point, Some(Attained { friction_n_m_s_per_rad, ..attained })));
         }
     }
-    match grid(range).find(unstable) {
-        Some(point) => refused(point, None),
-        None => not_proved(Reason::NoPointFound),
-    }
+    grid(range).find(unstable).map(|point| (point, None)).ok_or(Reason::NoPointFound)
 }
 
-fn coordinates(point: &BoxPoint) -> [&BigRational; 3] {
+pub(crate) fn coordinates(point: &BoxPoint) -> [&BigRational; 3] {
     [&point.inertia_kg_m2, &point.friction_n_m_s_per_rad, &point.stiffness_n_m_per_rad].map(Number::value)
 }
 

@@ -8,6 +8,8 @@
 //! |---|---|
 //! | `problem` | gains, family and constants of an arm as a document without claims |
 //! | `exponential` | largest certified decay rate of the linearised loops, or a counterexample |
+//! | `sampled` | decay rate and delay margin of the sampled linearised loops, or a counterexample |
+//! | `margins` | how far a bound of the family may, or must, be moved |
 //! | `region` | largest certified ball of starts of the nonlinear loop |
 //! | `disturbance` | least bound on the error under noise and pushes |
 //! | `digits` | figures rounded to the safe side |
@@ -15,6 +17,7 @@
 //! | `moving_goal` | the fastest goal that a region allows |
 //! | `sampled_region` | the same of the sampled nonlinear loop |
 //! | `adaptive` | convergence, the frozen loop and the sampled velocity loop of the adaptive controller |
+//! | `lyapunov` | Lyapunov matrices of any linear loop or polytope of loops |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
@@ -26,26 +29,31 @@ mod disturbance;
 mod exponential;
 mod joint_region;
 mod lmi;
+mod lyapunov;
+mod margins;
 mod moving_goal;
 mod problem;
 mod region;
+mod sampled;
 mod sampled_region;
 
 pub use adaptive::{adaptive_convergence, adaptive_sampled, pi_exponential};
 pub use disturbance::{DisturbanceOptions, disturbance};
-pub use exponential::{UnstableLoop, exponential};
+pub use exponential::{Attain, UnstableLoop, exponential};
 pub use joint_region::{JointRegionOptions, joint_region};
 pub use lmi::{Affine, Program, Solution, SolveError};
+pub use lyapunov::{LinearFamily, LyapunovFailure, LyapunovMatrix, fastest_decay, lyapunov};
 pub use moving_goal::{GoalListValues, MovingGoalOptions, moving_goal, moving_goal_on};
 pub use problem::{
     AicGainValues, ArmValues, ConstantValues, EnclosureValues, FamilyValues, MracGainValues, Problem, ProblemError,
     SampledConstantValues, arm_ranges,
 };
 pub use region::{RegionOptions, region};
+pub use sampled::{SampledOptions, light_inertia_rule_s, sampled};
 pub use sampled_region::{SampledRegionOptions, sampled_region};
 
 use certune_verify::{
-    Attained, Certificate, Claim, ClaimKind, Document, NotProvedClaim, Number, Reason, Rejection, seal, verify,
+    Certificate, Claim, ClaimKind, Document, NotProvedClaim, Number, Reason, Rejection, seal, verify,
 };
 
 /// A document could not be turned into a certificate by its own checker: a defect of this crate, never of the input.
@@ -69,6 +77,8 @@ pub struct Options {
     pub region: RegionOptions,
     /// The region with gains, frictions and limits of each joint.
     pub joint_region: JointRegionOptions,
+    /// The sampled loop.
+    pub sampled: SampledOptions,
     /// The goal that moves.
     pub moving_goal: MovingGoalOptions,
     /// The region of the sampled nonlinear loop.
@@ -79,8 +89,8 @@ pub struct Options {
 
 /// Makes the claims about a problem, in the order asked for, and has them checked.
 ///
-/// `attain` is asked, after a refusal of `exponential`, for an arm and configuration of the family whose linearised loop is
-/// unstable; it may return `None`.
+/// `attain` is asked, after a refusal of `exponential` or `sampled`, for an arm and configuration of the family whose linearised loop, in continuous
+/// time or sampled, is unstable; it may return `None`.
 ///
 /// # Errors
 /// [`CertifyError`] when the checker does not accept the document, which would be a defect of this crate.
@@ -88,12 +98,13 @@ pub fn certify(
     problem: &Problem,
     claims: &[ClaimKind],
     options: &Options,
-    attain: &dyn Fn() -> Option<(UnstableLoop, Attained)>,
+    attain: &Attain<'_>,
 ) -> Result<Certificate, CertifyError> {
     let mut document = problem.document().clone();
     for kind in claims {
         let made = match kind {
             ClaimKind::Exponential => vec![exponential(problem, attain)],
+            ClaimKind::Sampled => vec![sampled(problem, &options.sampled, attain)],
             ClaimKind::Region => vec![region(problem, &options.region)],
             ClaimKind::JointRegion => vec![joint_region(problem, &options.joint_region)],
             ClaimKind::MovingGoal => moving_goal(problem, &document, &options.moving_goal),
@@ -109,7 +120,8 @@ pub fn certify(
 
 /// An entry that says why there is neither a proof nor a counterexample.
 pub(crate) fn not_proved(of: ClaimKind, reason: Reason, distance: Option<f64>) -> Claim {
-    Claim::NotProved(NotProvedClaim { of, distance: distance.and_then(Number::decimal), reason })
+    let distance = distance.and_then(Number::decimal);
+    Claim::NotProved(NotProvedClaim { of, sampling: None, distance, reason, remedies: Vec::new() })
 }
 
 /// The text of a sealed document, as it is written to a file.

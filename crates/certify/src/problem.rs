@@ -222,6 +222,12 @@ pub enum ProblemError {
         /// The number.
         value: f64,
     },
+    /// The constants are not known on the whole of a smaller box.
+    #[error("joint {joint} leaves the configurations that the constants are about")]
+    OutsideConstants {
+        /// Joint, counted from 1 at the base.
+        joint: usize,
+    },
 }
 
 /// A document without claims.
@@ -343,10 +349,19 @@ impl Problem {
             rows.iter().map(|row| numbers(quantity, row)).collect::<Result<Vec<_>, ProblemError>>()
         };
         let constants = &mut self.document.constants;
-        constants.over = ConfigurationSet::Box {
-            lower_rad: numbers("lower_rad", &values.lower_rad)?,
-            upper_rad: numbers("upper_rad", &values.upper_rad)?,
-        };
+        let (lower_rad, upper_rad) =
+            (numbers("lower_rad", &values.lower_rad)?, numbers("upper_rad", &values.upper_rad)?);
+        if let ConfigurationSet::Box { lower_rad: known_lower, upper_rad: known_upper } = &constants.over {
+            for joint in 0..lower_rad.len() {
+                let inside = |lower: &Number, upper: &Number| {
+                    lower.value() <= lower_rad[joint].value() && upper_rad[joint].value() <= upper.value()
+                };
+                if !known_lower.get(joint).zip(known_upper.get(joint)).is_some_and(|(l, u)| inside(l, u)) {
+                    return Err(ProblemError::OutsideConstants { joint: joint + 1 });
+                }
+            }
+        }
+        constants.over = ConfigurationSet::Box { lower_rad, upper_rad };
         constants.bounds.inertia = Some(InertiaEnclosure {
             midpoint_kg_m2: matrix("midpoint_kg_m2", &values.midpoint_kg_m2)?,
             radius_kg_m2: matrix("radius_kg_m2", &values.radius_kg_m2)?,

@@ -49,10 +49,10 @@ impl Default for SampledRegionOptions {
 /// Margins by which the inequalities are tightened, in turn.
 const STRICTNESS: [f64; 4] = [1e-7, 1e-6, 1e-5, 1e-4];
 /// Where `rho` and `speed` are searched first.
-const RHO: [f64; 3] = [0.03, 0.1, 0.3];
-const SPEED: [f64; 4] = [0.004, 0.008, 0.016, 0.032];
+const RHO: [f64; 3] = [0.04, 0.12, 0.36];
+const SPEED: [f64; 3] = [0.005, 0.01, 0.02];
 /// Factors by which the pattern search moves, in turn.
-const MOVES: [f64; 3] = [1.6, 1.25, 1.1];
+const MOVES: [f64; 2] = [1.4, 1.15];
 
 /// The claim `sampled-region` with the largest radius found, or "not proved".
 pub fn sampled_region(problem: &Problem, options: &SampledRegionOptions) -> Claim {
@@ -213,7 +213,7 @@ impl Candidate {
             }
         }
         let mut multiplier = |used: bool, unit: f64| if used { next(true) * unit } else { 0.0 };
-        let mean = motion.remainder().recip();
+        let mean = motion.mean_bounds()[0][0].recip();
         let span = motion.friction()[1].max(1e-3).powi(-2);
         let mut four = || {
             [
@@ -274,7 +274,7 @@ impl Candidate {
             if let Some(friction) = friction {
                 row -= change.row(friction) * (sign * lead);
             }
-            row[mean] += motion.remainder().sqrt() / root;
+            row[mean] += motion.mean_bounds()[0][0].sqrt() / root;
             change.set_row(mean, &(row * scale));
         }
         change
@@ -317,15 +317,7 @@ impl Candidate {
             }
         }
         blocks.push(Box::new(|x| DMatrix::from_element(1, 1, self.unknowns(x).theta)));
-        let t0 = std::time::Instant::now();
-        let r = Program { cost, nonnegative, blocks }.solve();
-        println!(
-            "{:?} {strictness} {:?} {:?}",
-            self.bounds,
-            t0.elapsed(),
-            r.as_ref().map(|s| (s.accurate, self.unknowns(&s.x).s[0][0]))
-        );
-        let x = r.ok()?.x;
+        let x = Program { cost, nonnegative, blocks }.solve().ok()?.x;
         let found = Found { x: self.unknowns(&x), bounds: self.bounds, points: self.points.clone() };
         (found.start() > 0.0).then_some(found)
     }

@@ -76,7 +76,7 @@ fn limited() -> JointRegionOptions {
 fn proved(problem: &Problem, options: &JointRegionOptions) -> JointRegionClaim {
     let start = Instant::now();
     let options = Options { joint_region: options.clone(), ..Options::default() };
-    let certificate = certify(problem, &[ClaimKind::JointRegion], &options, &|| None).unwrap();
+    let certificate = certify(problem, &[ClaimKind::JointRegion], &options, &|_| None).unwrap();
     let Claim::JointRegion(claim) = &certificate.document().claims[0].claim else {
         panic!("{}", certificate.document().claims[0].statement)
     };

@@ -52,7 +52,7 @@ fn constants(margin: f64) -> SampledConstantValues {
 }
 
 fn claims(problem: &Problem, claim: ClaimKind) -> Certificate {
-    certify(problem, &[claim], &Options::default(), &|| None).unwrap()
+    certify(problem, &[claim], &Options::default(), &|_| None).unwrap()
 }
 
 fn radius(problem: &Problem) -> f64 {
@@ -100,8 +100,10 @@ fn radii_with_wide_constants_and_limits() {
     let with = |problem: &Problem, region: RegionOptions| {
         let start = std::time::Instant::now();
         let certificate =
-            certify(problem, &[ClaimKind::Region], &Options { region: region.clone(), ..Options::default() }, &|| None)
-                .unwrap();
+            certify(problem, &[ClaimKind::Region], &Options { region: region.clone(), ..Options::default() }, &|_| {
+                None
+            })
+            .unwrap();
         let Claim::Region(claim) = &certificate.document().claims[0].claim else {
             panic!("{:?}", certificate.document().claims[0])
         };

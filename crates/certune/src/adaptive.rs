@@ -4,13 +4,11 @@
 //! holds there as well.
 
 use certune_bounds::enclosure;
-use certune_certify::{
-    CertifyError, EnclosureValues, Problem, adaptive_convergence, adaptive_sampled, pi_exponential, to_json,
-};
+use certune_certify::{EnclosureValues, Problem, adaptive_convergence, adaptive_sampled, pi_exponential};
 use certune_control::mrac::{MracGains, MracParams};
-use certune_verify::{Certificate, Claim, ClaimKind, seal, verify};
+use certune_verify::{Certificate, Claim, ClaimKind};
 
-use crate::stability::{Answer, ArmCertifier, ArmGains, STEP_S, StabilityError};
+use crate::stability::{Answer, ArmCertifier, ArmGains, STEP_S, StabilityError, checked};
 
 /// A goal, the box around it, and what the sampled claim assumes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,13 +54,9 @@ impl<const N: usize> ArmCertifier<N> {
     ) -> Result<Answer, StabilityError> {
         MracParams::new(gains, STEP_S)?;
         let problem = self.adaptive_problem(gains, setting)?;
-        let mut document = problem.document().clone();
-        for kind in claims {
-            document.claims.push(self.adaptive_claim(&problem, setting, *kind).into());
-        }
-        let text = to_json(&seal(document)).map_err(CertifyError::from)?;
-        let checked = verify(&text, problem.records()).map_err(CertifyError::from)?;
-        Ok(Answer { certificate: checked.map_err(CertifyError::from)?, records: problem.records().to_vec() })
+        let made = claims.iter().map(|kind| self.adaptive_claim(&problem, setting, *kind)).collect();
+        let certificate = checked(problem.document().clone(), made, problem.records())?;
+        Ok(Answer { certificate, records: problem.records().to_vec() })
     }
 
     fn adaptive_claim(&self, problem: &Problem, setting: &AdaptiveSetting<N>, kind: ClaimKind) -> Claim {

@@ -56,6 +56,7 @@ pub use certune_verify as verify;
 pub mod guide {}
 
 mod adaptive;
+mod lyapunov;
 mod stability;
 
 pub use adaptive::AdaptiveSetting;

@@ -9,6 +9,7 @@
 //! | [`plant_box`] | the family of plants a scenario declares, and seeded draws |
 //! | [`simulate`](mod@simulate) | the loop at 1 kHz, without a heap |
 //! | [`metrics`] | figures per goal and joint |
+//! | [`drift`] | how far the adaptive gains drift from goal to goal |
 //! | [`trajectory`] | a run kept for plots |
 //! | [`linear`] | plant and active inference controller linearised, continuous and sampled |
 //! | [`knowledge`] | the arm's model handed to a baseline controller |
@@ -41,6 +42,7 @@
 //! ```
 #![forbid(unsafe_code)]
 
+pub mod drift;
 pub mod file;
 pub mod gains;
 pub mod knowledge;
@@ -52,6 +54,7 @@ pub mod simulate;
 pub mod task;
 pub mod trajectory;
 
+pub use drift::{GainDrift, gain_drift};
 pub use file::{FileError, KeyError, Location, Problem};
 pub use gains::{AicTable, Gains, GainsFile, LawName, MracTable, PerJoint};
 pub use knowledge::KnownModel;

@@ -66,5 +66,5 @@ pub use gravity::{gravity_jacobian, gravity_torque};
 pub use inverse::inverse_dynamics;
 pub use linearise::{Linearisation, linearise};
 pub use mass::mass_matrix;
-pub use model::{Model, State};
+pub use model::{LinkConstants, Model, State};
 pub use robot::{Frame, GRASP_BEYOND_FLANGE_M, GRAVITY_M_PER_S2, Inertia, JointLimits, Link, Payload, Robot};

@@ -41,6 +41,21 @@ pub struct Model<const N: usize, T: Real = f64> {
     pub(crate) flange_position: Vector3<T>,
 }
 
+/// The numbers of one link that enter the recursions, for methods that need them one by one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkConstants {
+    /// Joint frame in the parent link at q = 0: row-major rotation, columns are the frame's axes.
+    pub rotation: [[f64; 3]; 3],
+    /// Joint frame in the parent link at q = 0: origin, m.
+    pub position_m: [f64; 3],
+    /// Mass, kg.
+    pub mass_kg: f64,
+    /// Mass times centre of mass, in the link's frame, kg m.
+    pub first_moment_kg_m: [f64; 3],
+    /// Inertia about the origin of the link's frame: xx, yy, zz, xy, xz, yz, kg m^2.
+    pub about_origin_kg_m2: [f64; 6],
+}
+
 /// Joint positions in rad and velocities in rad/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State<const N: usize, T: Real = f64> {
@@ -132,6 +147,26 @@ impl<const N: usize> Model<N> {
     /// Mass of each link, payload included, kg.
     pub fn link_masses_kg(&self) -> [f64; N] {
         core::array::from_fn(|i| self.links[i].body.mass)
+    }
+
+    /// Frames and bodies of all links, base to tip.
+    pub fn link_constants(&self) -> [LinkConstants; N] {
+        core::array::from_fn(|i| {
+            let CompiledLink { rotation: r, position, body } = self.links[i];
+            let inertia = body.about_origin;
+            LinkConstants {
+                rotation: core::array::from_fn(|a| core::array::from_fn(|b| r[(a, b)])),
+                position_m: position.into(),
+                mass_kg: body.mass,
+                first_moment_kg_m: body.first_moment.into(),
+                about_origin_kg_m2: [inertia.xx, inertia.yy, inertia.zz, inertia.xy, inertia.xz, inertia.yz],
+            }
+        })
+    }
+
+    /// Acceleration of a falling body in the base frame, m/s^2.
+    pub fn gravity_m_per_s2(&self) -> [f64; 3] {
+        self.gravity.into()
     }
 
     /// The same arm in every lane of another scalar.

@@ -1,6 +1,6 @@
 //! Claims in the words of the page: what holds, how well, and resting on what.
 //!
-//! A claim is worth no more than the weakest of its own grade and its assumptions' grades. The word "proved" is written
+//! A claim is worth no more than the weakest of its own grade and its assumptions' grades, those that have one. The word "proved" is written
 //! for a claim that holds and is worth that much; the only other use is the verdict "not proved".
 
 use std::collections::BTreeSet;
@@ -41,7 +41,7 @@ pub(crate) struct AssumptionView<'a> {
 
 /// Grade of a claim: the weakest link.
 pub(crate) fn worth(claim: &Claim) -> Grade {
-    claim.assumptions.iter().map(|assumption| assumption.grade).fold(claim.grade, Grade::min)
+    claim.assumptions.iter().filter_map(|assumption| assumption.grade).fold(claim.grade, Grade::min)
 }
 
 /// Every claim, for the page.
@@ -114,9 +114,10 @@ fn view(claim: &Claim) -> ClaimView<'_> {
 
 fn assumption(assumption: &Assumption) -> AssumptionView<'_> {
     let grade = match assumption.grade {
-        Grade::Sampled => "sampled",
-        Grade::Conditional => "conditional",
-        Grade::Proved => "exact",
+        Some(Grade::Sampled) => "sampled",
+        Some(Grade::Conditional) => "conditional",
+        Some(Grade::Proved) => "exact",
+        None => "model",
     };
     AssumptionView { text: &assumption.text, grade }
 }

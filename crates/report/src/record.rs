@@ -341,8 +341,8 @@ pub enum Grade {
 pub struct Assumption {
     /// In words, with its numbers.
     pub text: String,
-    /// Worth of its own evidence.
-    pub grade: Grade,
+    /// Worth of its own evidence; `None` for what the arm and the loop are taken to be, which is part of the statement.
+    pub grade: Option<Grade>,
 }
 
 /// One figure of merit of a claim.

@@ -122,16 +122,27 @@ fn a_proof_is_called_one_only_when_every_link_is() {
     let mut record = synthetic::record();
     for claim in &mut record.certificate.claims {
         claim.grade = Grade::Proved;
-        claim.assumptions.iter_mut().for_each(|assumption| assumption.grade = Grade::Proved);
+        claim.assumptions.iter_mut().for_each(|assumption| assumption.grade = Some(Grade::Proved));
     }
     let html = page(&record);
     assert!(html.contains("both claims proved") && html.contains(">Proved</span>"));
 
-    record.certificate.claims[0].assumptions[1].grade = Grade::Sampled;
-    record.certificate.claims[1].assumptions[2].grade = Grade::Conditional;
+    record.certificate.claims[0].assumptions[1].grade = Some(Grade::Sampled);
+    record.certificate.claims[1].assumptions[2].grade = Some(Grade::Conditional);
     let html = page(&record);
     assert!(!html.to_lowercase().contains("proved"));
     assert!(html.contains("both claims seen to hold in samples only"));
+}
+
+#[test]
+fn what_the_arm_is_taken_to_be_is_no_weakness_of_a_proof() {
+    let mut record = synthetic::record();
+    for claim in &mut record.certificate.claims {
+        claim.grade = Grade::Proved;
+        claim.assumptions.iter_mut().for_each(|assumption| assumption.grade = None);
+    }
+    let html = page(&record);
+    assert!(html.contains("both claims proved") && html.contains(r#"<span class="grade model">model</span>"#));
 }
 
 #[test]

@@ -167,4 +167,38 @@ impl SharedGains {
             b: [one, zero(), av.clone(), zero(), -torque_per_velocity],
         }
     }
+
+    /// One sampling step of length h: `x+ = F x + G y`, `x = (m, mu', mu'', u~)`, `y = (e, dq)`; the torque that follows is `u~+`.
+    ///
+    /// The beliefs take an Euler step from the old beliefs and the new measurement; the torque then descends with the beliefs just updated.
+    pub(crate) fn sampled(&self, h: &BigRational) -> SampledMatrices {
+        const BELIEFS: usize = 3;
+        let Controller { a, b } = self.matrices();
+        let mut f: [[BigRational; 4]; 4] = Default::default();
+        let mut g: [[BigRational; 2]; 4] = Default::default();
+        for i in 0..BELIEFS {
+            for j in 0..BELIEFS {
+                f[i][j] = h * &a[i + 1][j + 1];
+            }
+            f[i][i] += BigRational::one();
+            g[i] = [h * &a[i + 1][0], h * &b[i + 1]];
+        }
+        // u~+ = u~ + h (a_40 e + b_4 dq + a_41 m+ + a_42 mu'+).
+        let [of_e, of_m, of_dmu, ..] = &a[BELIEFS + 1];
+        let chained = |m: &BigRational, dmu: &BigRational| h * (of_m * m + of_dmu * dmu);
+        for j in 0..BELIEFS {
+            f[BELIEFS][j] = chained(&f[0][j], &f[1][j]);
+        }
+        f[BELIEFS][BELIEFS] = BigRational::one();
+        for (j, direct) in [of_e, &b[BELIEFS + 1]].into_iter().enumerate() {
+            g[BELIEFS][j] = chained(&g[0][j], &g[1][j]) + h * direct;
+        }
+        SampledMatrices { f, g }
+    }
+}
+
+/// `x+ = F x + G y` of one joint; the torque is the last state.
+pub(crate) struct SampledMatrices {
+    pub(crate) f: [[BigRational; 4]; 4],
+    pub(crate) g: [[BigRational; 2]; 4],
 }

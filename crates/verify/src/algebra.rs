@@ -1,12 +1,11 @@
 //! Exact linear algebra and polynomials over the rationals.
 //!
-//! Determinants and Sturm sequences run over the integers (Bareiss; primitive remainders), where no fraction has to be
-//! reduced at every step.
+//! Hurwitz determinants run over the integers (Bareiss), where no fraction has to be reduced at every step.
 //!
-//! Sources: characteristic polynomial by Faddeev and LeVerrier; stability of a polynomial by Hurwitz determinants
-//! (Gantmacher, *Theory of Matrices*, vol. 2, ch. XV); real roots in an interval by Sturm's theorem; definiteness by LDL'.
+//! Sources: characteristic polynomial and adjugate by Faddeev and LeVerrier; stability of a polynomial by Hurwitz determinants
+//! (Gantmacher, *Theory of Matrices*, vol. 2, ch. XV); definiteness by LDL'.
 
-use num_bigint::{BigInt, Sign};
+use num_bigint::BigInt;
 use num_integer::Integer;
 use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
@@ -51,24 +50,81 @@ pub(crate) fn positive_definite_pivots(matrix: &Matrix) -> Option<Vec<BigRationa
     Some(pivots)
 }
 
+/// As [`positive_definite_pivots`] for large matrices: pivots of an equilibrated matrix that is smaller by a rounding.
+///
+/// With powers of two `d_i`, `d_i d_j a_ij = 2^-BITS (n_ij + f_ij)`, `n_ij` whole and `0 <= f_ij < 1`. A symmetric matrix with entries in [0, 1) is at least
+/// `-n I`, so it is enough that the integers `n_ij`, less the order on the diagonal, are positive definite: Bareiss, whose pivots are the leading minors. A matrix
+/// that is definite by less than about `n 2^-BITS` is not recognised.
+pub(crate) fn positive_definite_rounded(matrix: &Matrix) -> Option<Vec<BigRational>> {
+    const BITS: i64 = 64;
+    let order = matrix.len();
+    let symmetric =
+        matrix.iter().all(|row| row.len() == order) && (0..order).all(|i| (0..i).all(|j| matrix[i][j] == matrix[j][i]));
+    if order == 0 || !symmetric || !(0..order).all(|i| matrix[i][i].is_positive()) {
+        return None;
+    }
+    // Half the binary exponent of the diagonal.
+    let size =
+        |x: &BigRational| i64::try_from(x.numer().bits()).unwrap_or(0) - i64::try_from(x.denom().bits()).unwrap_or(0);
+    let half: Vec<i64> = (0..order).map(|i| size(&matrix[i][i]).div_euclid(2)).collect();
+    let mut whole = vec![vec![BigInt::zero(); order]; order];
+    for i in 0..order {
+        for j in 0..order {
+            let (entry, shift) = (&matrix[i][j], BITS - half[i] - half[j]);
+            let power = shift.unsigned_abs();
+            let (numerator, denominator) = if shift >= 0 {
+                (entry.numer() << power, entry.denom().clone())
+            } else {
+                (entry.numer().clone(), entry.denom() << power)
+            };
+            whole[i][j] = numerator.div_floor(&denominator);
+        }
+        whole[i][i] -= BigInt::from(order);
+    }
+    let unit = BigInt::one() << BITS.unsigned_abs();
+    let mut previous = BigInt::one();
+    let mut pivots = Vec::with_capacity(order);
+    for k in 0..order {
+        let pivot = whole[k][k].clone();
+        if !pivot.is_positive() {
+            return None;
+        }
+        for i in k + 1..order {
+            for j in i..order {
+                let entry = (&pivot * &whole[i][j] - &whole[i][k] * &whole[k][j]) / &previous;
+                whole[j][i].clone_from(&entry);
+                whole[i][j] = entry;
+            }
+        }
+        pivots.push(BigRational::new(pivot.clone(), &previous * &unit));
+        previous = pivot;
+    }
+    Some(pivots)
+}
+
 /// `det(s I - A)`, coefficients from the highest power down, the first being 1.
 pub(crate) fn characteristic_polynomial(a: &Matrix) -> Vec<BigRational> {
+    resolvent(a).0
+}
+
+/// `det(s I - A)` and the adjugate of `s I - A`, both by powers of s, the highest first.
+pub(crate) fn resolvent(a: &Matrix) -> (Vec<BigRational>, Vec<Matrix>) {
     let order = a.len();
     let mut coefficients = vec![BigRational::one()];
-    // Faddeev-LeVerrier: M_1 = A, c_k = -tr(M_k)/k, M_{k+1} = A (M_k + c_k I).
-    let mut product = a.clone();
+    let mut adjugate: Vec<Matrix> = Vec::with_capacity(order);
+    // Faddeev-LeVerrier: N_0 = I, c_k = -tr(A N_{k-1})/k, N_k = A N_{k-1} + c_k I.
+    let mut next = zeros(order);
     for k in 1..=order {
+        for (i, row) in next.iter_mut().enumerate() {
+            row[i] += &coefficients[k - 1];
+        }
+        let product = multiply(a, &next);
         let trace: BigRational = (0..order).map(|i| product[i][i].clone()).sum();
-        let coefficient = -trace / BigRational::from_integer(k.into());
-        for (i, row) in product.iter_mut().enumerate() {
-            row[i] += &coefficient;
-        }
-        if k < order {
-            product = multiply(a, &product);
-        }
-        coefficients.push(coefficient);
+        coefficients.push(-trace / BigRational::from_integer(k.into()));
+        adjugate.push(next);
+        next = product;
     }
-    coefficients
+    (coefficients, adjugate)
 }
 
 fn multiply(x: &Matrix, y: &Matrix) -> Matrix {
@@ -94,33 +150,17 @@ pub(crate) fn common_integers(polynomials: &[Vec<BigRational>]) -> Vec<Vec<BigIn
     polynomials.iter().map(|p| p.iter().map(whole).collect()).collect()
 }
 
-/// Bareiss's elimination: every division is exact, and the last pivot is the determinant.
-fn determinant(mut matrix: Vec<Vec<BigInt>>) -> BigInt {
-    let order = matrix.len();
-    let mut previous = BigInt::one();
-    let mut negative = false;
-    for k in 0..order {
-        let Some(row) = (k..order).find(|&i| !matrix[i][k].is_zero()) else {
-            return BigInt::zero();
-        };
-        if row != k {
-            matrix.swap(row, k);
-            negative = !negative;
-        }
-        let pivot = matrix[k][k].clone();
-        for i in k + 1..order {
-            for j in k + 1..order {
-                matrix[i][j] = (&pivot * &matrix[i][j] - &matrix[i][k] * &matrix[k][j]) / &previous;
-            }
-        }
-        previous = pivot;
+/// Whether every root of `p` (coefficients from the highest power down) has a negative real part.
+///
+/// Exact: the leading minors of the Hurwitz matrix, which are the pivots of Bareiss's elimination without exchange of rows, must be
+/// positive. A polynomial of degree 0 or with a leading coefficient that is not positive is answered with `false`: an empty
+/// set of roots would be vacuously stable.
+pub(crate) fn is_hurwitz(p: &[BigInt]) -> bool {
+    let Some(degree) = p.len().checked_sub(1).filter(|&degree| degree > 0) else { return false };
+    if !p[0].is_positive() {
+        return false;
     }
-    if negative { -previous } else { previous }
-}
-
-/// The leading Hurwitz determinant of size `size` of `p`, coefficients from the highest power down.
-pub(crate) fn hurwitz_determinant(p: &[BigInt], size: usize) -> BigInt {
-    let mut matrix = vec![vec![BigInt::zero(); size]; size];
+    let mut matrix = vec![vec![BigInt::zero(); degree]; degree];
     for (row, entries) in matrix.iter_mut().enumerate() {
         for (column, entry) in entries.iter_mut().enumerate() {
             // Entry (i, j), counted from 1, is the coefficient a_{2j - i}.
@@ -130,129 +170,20 @@ pub(crate) fn hurwitz_determinant(p: &[BigInt], size: usize) -> BigInt {
             }
         }
     }
-    determinant(matrix)
-}
-
-/// Whether every root of `p` (coefficients from the highest power down) has a negative real part.
-///
-/// Exact. A polynomial of degree 0 or with a leading coefficient that is not positive is answered with `false`: an empty
-/// set of roots would be vacuously stable.
-pub(crate) fn is_hurwitz(p: &[BigInt]) -> bool {
-    p.len() >= 2 && p[0].is_positive() && (1..p.len()).all(|size| hurwitz_determinant(p, size).is_positive())
-}
-
-/// A polynomial in one variable with integer coefficients, from the constant up, without trailing zeros.
-///
-/// Only its roots matter here, so it may be multiplied by positive numbers.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Polynomial(Vec<BigInt>);
-
-impl Polynomial {
-    /// The polynomial divided by the content of its coefficients, which is positive.
-    pub(crate) fn new(mut coefficients: Vec<BigInt>) -> Self {
-        while coefficients.last().is_some_and(Zero::is_zero) {
-            coefficients.pop();
-        }
-        let content = coefficients.iter().fold(BigInt::zero(), |gcd, c| gcd.gcd(c));
-        if content > BigInt::one() {
-            for c in &mut coefficients {
-                *c = &*c / &content;
-            }
-        }
-        Self(coefficients)
-    }
-
-    /// A positive multiple of the polynomial of degree below `values.len()` that takes `values[k]` at `k = 0, 1, 2, ..`.
-    ///
-    /// Newton's form on the integers, `p(x) = sum_k D^k(0) x (x-1) .. (x-k+1) / k!`, times `n!`.
-    pub(crate) fn through(values: &[BigInt]) -> Self {
-        let mut differences = values.to_vec();
-        for level in 1..values.len() {
-            for k in (level..values.len()).rev() {
-                differences[k] = &differences[k] - &differences[k - 1];
-            }
-        }
-        // Horner: p = c_n; p = p (x - k) + c_k, with c_k = D^k(0) n! / k!.
-        let mut weight = BigInt::one();
-        let mut coefficients: Vec<BigInt> = Vec::new();
-        for (k, difference) in differences.iter().enumerate().rev() {
-            let node = BigInt::from(k);
-            let mut next = vec![BigInt::zero(); coefficients.len() + 1];
-            for (power, coefficient) in coefficients.iter().enumerate() {
-                next[power + 1] += coefficient;
-                next[power] -= coefficient * &node;
-            }
-            next[0] += difference * &weight;
-            coefficients = next;
-            weight *= node;
-        }
-        Self::new(coefficients)
-    }
-
-    /// Whether the value at `numerator / denominator`, `denominator > 0`, is negative, zero or positive.
-    pub(crate) fn sign_at(&self, numerator: &BigInt, denominator: &BigInt) -> Sign {
-        let mut value = BigInt::zero();
-        let mut power = BigInt::one();
-        for coefficient in self.0.iter().rev() {
-            value = value * numerator + coefficient * &power;
-            power *= denominator;
-        }
-        value.sign()
-    }
-
-    fn derivative(&self) -> Self {
-        Self::new(self.0.iter().enumerate().skip(1).map(|(k, c)| c * BigInt::from(k)).collect())
-    }
-
-    /// Minus the remainder of `self / divisor`, times a positive number.
-    fn negative_remainder(&self, divisor: &Self) -> Self {
-        let mut rest = self.0.clone();
-        let Some(lead) = divisor.0.last() else { return Self(Vec::new()) };
-        while rest.len() >= divisor.0.len() {
-            let Some(top) = rest.last().cloned() else { break };
-            // |lead| rest - sign(lead) top x^shift divisor: the top cancels, and |lead| is positive.
-            let top = if lead.is_negative() { -top } else { top };
-            let shift = rest.len() - divisor.0.len();
-            for c in &mut rest {
-                *c *= lead.abs();
-            }
-            for (k, c) in divisor.0.iter().enumerate() {
-                rest[shift + k] -= &top * c;
-            }
-            rest.pop();
-        }
-        Self::new(rest.into_iter().map(|c| -c).collect())
-    }
-
-    /// Whether the polynomial has no real root in the closed interval `[0, 1]`.
-    ///
-    /// Exact, by Sturm's theorem, which counts the distinct roots in `(0, 1]` when neither end is a root. The zero
-    /// polynomial has roots everywhere.
-    pub(crate) fn has_no_root_in_unit_interval(&self) -> bool {
-        self.has_no_root_in([&BigInt::zero(), &BigInt::one()], &BigInt::one())
-    }
-
-    /// As above for `[lower / denominator, upper / denominator]`.
-    fn has_no_root_in(&self, [lower, upper]: [&BigInt; 2], denominator: &BigInt) -> bool {
-        let is_root = |x: &BigInt| self.sign_at(x, denominator) == Sign::NoSign;
-        if self.0.is_empty() || is_root(lower) || is_root(upper) {
+    let mut previous = BigInt::one();
+    for k in 0..degree {
+        let pivot = matrix[k][k].clone();
+        if !pivot.is_positive() {
             return false;
         }
-        let mut chain = vec![self.clone(), self.derivative()];
-        while let [.., before, last] = &chain[..] {
-            if last.0.is_empty() {
-                break;
+        for i in k + 1..degree {
+            for j in k + 1..degree {
+                matrix[i][j] = (&pivot * &matrix[i][j] - &matrix[i][k] * &matrix[k][j]) / &previous;
             }
-            let next = before.negative_remainder(last);
-            chain.push(next);
         }
-        let changes = |x: &BigInt| {
-            let signs: Vec<Sign> =
-                chain.iter().map(|p| p.sign_at(x, denominator)).filter(|&sign| sign != Sign::NoSign).collect();
-            signs.windows(2).filter(|pair| pair[0] != pair[1]).count()
-        };
-        changes(lower) == changes(upper)
+        previous = pivot;
     }
+    true
 }
 
 #[cfg(test)]
@@ -271,10 +202,6 @@ mod tests {
 
     fn one_in_integers(p: Vec<BigRational>) -> Vec<BigInt> {
         common_integers(&[p]).remove(0)
-    }
-
-    fn no_root(p: &Polynomial, lower: i64, upper: i64, denominator: i64) -> bool {
-        p.has_no_root_in([&lower.into(), &upper.into()], &denominator.into())
     }
 
     fn matrix(rows: &[&[i64]]) -> Matrix {
@@ -321,13 +248,37 @@ mod tests {
     }
 
     #[test]
-    fn sturm_sees_double_roots_and_roots_at_the_ends() {
-        let double = Polynomial::new(integers(&[1, -2, 1])); // (x - 1)^2
-        assert!(!no_root(&double, 0, 2, 1));
-        assert!(no_root(&double, 0, 9, 10));
-        assert!(!double.has_no_root_in_unit_interval());
-        assert!(Polynomial::new(integers(&[3])).has_no_root_in_unit_interval());
-        assert!(!Polynomial::new(Vec::new()).has_no_root_in_unit_interval());
+    fn the_adjugate_times_the_matrix_is_the_determinant() {
+        let a = matrix(&[&[1, 2, 3], &[-1, 0, 2], &[4, 1, -5]]);
+        let (determinant, adjugate) = resolvent(&a);
+        let value = |x: i64| {
+            let at = |k: usize| ratio(x.pow((2 - k).try_into().unwrap()), 1);
+            let mut adj = zeros(3);
+            for (k, part) in adjugate.iter().enumerate() {
+                for i in 0..3 {
+                    for j in 0..3 {
+                        adj[i][j] += at(k) * &part[i][j];
+                    }
+                }
+            }
+            adj
+        };
+        for x in 2..5 {
+            let mut shifted = a.clone();
+            for (i, row) in shifted.iter_mut().enumerate() {
+                for entry in row.iter_mut() {
+                    *entry = -entry.clone();
+                }
+                row[i] += ratio(x, 1);
+            }
+            let d = determinant.iter().fold(ratio(0, 1), |sum, c| sum * ratio(x, 1) + c);
+            let product = multiply(&shifted, &value(x));
+            for (i, row) in product.iter().enumerate() {
+                for (j, entry) in row.iter().enumerate() {
+                    assert_eq!(*entry, if i == j { d.clone() } else { ratio(0, 1) });
+                }
+            }
+        }
     }
 
     proptest! {
@@ -339,8 +290,9 @@ mod tests {
                 g[i][j] += ratio(entries[4 * k + i] * entries[4 * k + j], 1);
             }} g[i][i] += ratio(shift, 1); }
             let minors_positive = (1..=4).all(|n| {
-                let leading = g[..n].iter().map(|row| row[..n].iter().map(|x| x.numer().clone()).collect()).collect();
-                determinant(leading).is_positive()
+                let leading: Matrix = g[..n].iter().map(|row| row[..n].to_vec()).collect();
+                let determinant = characteristic_polynomial(&leading).pop().unwrap();
+                (if n % 2 == 0 { determinant } else { -determinant }).is_positive()
             });
             prop_assert_eq!(positive_definite_pivots(&g).is_some(), minors_positive);
         }
@@ -355,23 +307,6 @@ mod tests {
             for (i, c) in p.iter().enumerate() { for (j, d) in quadratic.iter().enumerate() { product[i + j] += c * d; } }
             p = product;
             prop_assert_eq!(is_hurwitz(&one_in_integers(p)), real.iter().all(|&r| r < 0) && pair.0 < 0);
-        }
-
-        #[test]
-        fn sturm_agrees_with_chosen_roots(roots in prop::collection::vec(-20_i64..20, 1..6), interval in (-20_i64..20, 0_i64..15)) {
-            let mut down = with_roots(&roots.iter().map(|&r| ratio(r, 4)).collect::<Vec<_>>());
-            down.reverse();
-            let p = Polynomial::new(one_in_integers(down));
-            let free = !roots.iter().any(|&r| (interval.0..=interval.0 + interval.1).contains(&r));
-            prop_assert_eq!(no_root(&p, interval.0, interval.0 + interval.1, 4), free);
-        }
-
-        #[test]
-        fn interpolation_returns_the_polynomial(coefficients in prop::collection::vec(-9_i64..9, 1..7)) {
-            let p = Polynomial::new(integers(&coefficients));
-            let at = |x: i64| p.0.iter().rev().fold(BigInt::zero(), |sum, c| sum * x + c);
-            let values: Vec<_> = (0..7).map(at).collect();
-            prop_assert_eq!(Polynomial::through(&values), p);
         }
     }
 }

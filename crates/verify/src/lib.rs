@@ -10,7 +10,9 @@
 //! | `number` | decimals and dyadics as written, and the rational numbers they are |
 //! | `quantity` | what a number must be before anything is derived from it |
 //! | `outward` | square roots and exponentials rounded to the safe side |
-//! | `algebra` | characteristic polynomial, Hurwitz determinants, Sturm sequences, LDL' |
+//! | `algebra` | characteristic polynomial, Hurwitz determinants, LDL' |
+//! | `polytope` | whether every polynomial of a box of them is stable |
+//! | `sampled_loops` | the polynomials of the loops with a sampled controller and a delayed torque |
 //! | `form` | quadratic forms assembled from linear ones |
 //! | `aic`, `gains` | the controllers' gains, and the AIC's matrices |
 //! | `normed` | what a claim may rest on when an earlier one proves a region |
@@ -36,8 +38,10 @@ mod mrac;
 mod normed;
 mod number;
 mod outward;
+mod polytope;
 mod quantity;
 mod record;
+mod sampled_loops;
 mod statement;
 
 pub use aic::{AicGains, Controller, STATES};
@@ -52,4 +56,5 @@ pub use gains::{Gains, MracGains, MracLaw};
 pub use normed::{Norm, region_norm};
 pub use number::{Number, NumberError};
 pub use record::{BoundProof, Record};
+pub use sampled_loops::{MOST_DELAY_SAMPLES, PlantStep, SampledFamily};
 pub use statement::Assumption;

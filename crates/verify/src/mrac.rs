@@ -80,11 +80,17 @@ impl<'a> Adaptation<'a> {
     }
 }
 
-/// A goal that stands in a statement; returns its joint angles and their squared norm.
+/// A goal that stands in a statement, among the configurations of the constants; returns its joint angles and their squared norm.
 pub(crate) fn goal(document: &Document, goal_rad: &[Number]) -> Result<(Vec<BigRational>, BigRational), Flaw> {
     require_length("goal_rad", goal_rad.len(), document.arm.joints)?;
     for angle in goal_rad {
         require_plain("goal_rad", angle)?;
+    }
+    if let ConfigurationSet::Box { lower_rad, upper_rad } = &document.constants.over {
+        for ((lower, upper), angle) in lower_rad.iter().zip(upper_rad).zip(goal_rad) {
+            let inside = lower.value() <= angle.value() && angle.value() <= upper.value();
+            require("goal_rad", angle, inside, "an angle inside the constants' box")?;
+        }
     }
     let angles: Vec<BigRational> = goal_rad.iter().map(|angle| angle.value().clone()).collect();
     let square = angles.iter().map(|x| x * x).sum();

@@ -55,9 +55,35 @@ impl Number {
         format!("{}p{power}", exact.numer() >> twos).parse().ok()
     }
 
+    /// The decimal of a rational. `None` when it has none that fits a certificate.
+    pub fn decimal_of(value: BigRational) -> Option<Self> {
+        Self::exact(value).text.parse().ok()
+    }
+
     /// 0.
     pub fn zero() -> Self {
         Self { text: "0".to_owned(), value: BigRational::zero() }
+    }
+
+    /// A number derived from others, written as a decimal when it has a finite one and as a fraction for the eye when not: such a number is computed
+    /// with and printed, never read.
+    pub(crate) fn exact(value: BigRational) -> Self {
+        let mut scaled = value.clone();
+        let mut places = 0;
+        while !scaled.is_integer() && places < MAX_CHARS {
+            scaled *= BigRational::from_integer(10.into());
+            places += 1;
+        }
+        let text = if scaled.is_integer() {
+            let digits = format!("{:0>width$}", scaled.numer().magnitude(), width = places + 1);
+            let (whole, fraction) = digits.split_at(digits.len() - places);
+            let sign = if value < BigRational::zero() { "-" } else { "" };
+            let point = if fraction.is_empty() { "" } else { "." };
+            format!("{sign}{whole}{point}{fraction}")
+        } else {
+            value.to_string()
+        };
+        Self { text, value }
     }
 
     /// The number with the other sign.

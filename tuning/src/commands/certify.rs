@@ -1,7 +1,7 @@
 //! `autotune certify`: claims about given gains on a family of plants.
 
 use certune::certify::GoalListValues;
-use certune::closed_loop::{Gains, PlantBox, Scenario};
+use certune::closed_loop::{Gains, LawName, PlantBox, Scenario};
 use certune::dynamics::{Link, Robot, for_joint_count};
 use certune::verify::{Certificate, Evidence, Record};
 use certune::{Answer, ArmCertifier, ArmGains, Growth, Over, Request, certificate_text, family_of};
@@ -80,6 +80,9 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
         })?;
     } else {
         let mut text = claims_in_words(&certificate, &growth, context.verbose);
+        if let Some(note) = released_code(&gains) {
+            text.push_str(&output::wrapped(note, 0));
+        }
         if let Some(note) = beyond {
             text.push_str(&output::wrapped(&note, 0));
         }
@@ -121,17 +124,27 @@ struct Certified {
     unknown_records: Vec<Record>,
 }
 
-/// The goal of claims about one configuration; only an adaptive controller has such claims.
-fn at<const N: usize>(args: &CertifyArgs, robot: &Robot, gains: &ArmGains<N>) -> Result<Option<Vec<f64>>, Error> {
-    match (&args.at, gains) {
-        (Some(Numbers(found)), _) if found.len() != N => {
+/// What else could be asked about gains whose law no claim covers.
+fn released_code(gains: &GainsSource) -> Option<&'static str> {
+    match &gains.gains.gains {
+        Gains::Mrac(table) if table.law == LawName::ReleasedCode => Some(
+            "Note: the same gains under the paper's equations are another controller, which claims do cover: a gains file with law = \
+             \"reference-model\" or \"raw-goal\".",
+        ),
+        Gains::Mrac(_) | Gains::Aic(_) => None,
+    }
+}
+
+/// The configuration of claims about one.
+fn at<const N: usize>(args: &CertifyArgs, robot: &Robot) -> Result<Vec<f64>, Error> {
+    match &args.at {
+        Some(Numbers(found)) if found.len() != N => {
             Err(Error::ListLength { flag: "--at", found: found.len(), robot: robot.name().to_owned(), joints: N })
         }
-        (Some(Numbers(at)), _) => Ok(Some(at.clone())),
-        (None, ArmGains::Aic(_)) => Ok(None),
-        (None, ArmGains::Mrac(_)) => {
+        Some(Numbers(at)) => Ok(at.clone()),
+        None => {
             let scenario = catalogue::scenario(args.scenario.as_deref(), robot)?;
-            Ok(scenario.segments.first().map(|segment| segment.goal_rad.clone()))
+            Ok(scenario.segments.first().map_or(scenario.start_rad, |segment| segment.goal_rad.clone()))
         }
     }
 }
@@ -177,11 +190,11 @@ fn certificate<const N: usize>(
         Gains::Aic(table) => source.aic_gains::<N>(table, STEP_S)?.into(),
         Gains::Mrac(table) => (*source.mrac_params::<N>(table, STEP_S)?.gains()).into(),
     };
-    let request = Request {
+    let mut request = Request {
         claims: args.claims.clone(),
-        delay_samples: args.delay.unwrap_or(plant_box.delay_samples[1]),
+        delay_samples: args.delay,
         torque_limits: args.torque_limits.unwrap_or_default(),
-        at_rad: at(args, robot, &gains)?,
+        at_rad: Some(at::<N>(args, robot)?),
         goals: args
             .scenario
             .is_some()
@@ -190,6 +203,7 @@ fn certificate<const N: usize>(
             .map(goals),
         ..Request::default()
     };
+    request.effort.proofs.sampled_region.delay_samples = 0;
     let progress = Terminal::new(context.verbose);
     let certifier = ArmCertifier::<N>::new(robot, &family_of(plant_box)?)?.with_records(records, over)?;
     match certifier.record() {

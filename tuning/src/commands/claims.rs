@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use certune::dynamics::Robot;
-use certune::verify::{Assumption, Certificate, Checked, Claim, Figure, Grade, Verdict};
+use certune::verify::{Assumption, Certificate, Checked, Claim, Evidence, Figure, Grade, Verdict};
 use certune::{Growth, StabilityError, growth};
 use num_traits::ToPrimitive;
 use serde::Serialize;
@@ -140,13 +140,28 @@ fn summary(claim: &Claim, checked: &Checked, growth: Option<Growth>) -> ClaimSum
     }
 }
 
+/// What the claims are about, short of the constants' values.
+fn without_constants(about: &str, certificate: &Certificate) -> String {
+    let (mark, rest) = match &certificate.document().constants.evidence {
+        Evidence::Sampled { .. } => (
+            " The condition: ",
+            "The constants that bound the arm were sampled, so every claim is conditional; -v shows them.",
+        ),
+        Evidence::Proved { .. } => {
+            (" The constants are proved", "The constants that bound the arm are proved; -v shows them.")
+        }
+    };
+    about.split_once(mark).map_or_else(|| about.to_owned(), |(head, _)| format!("{head} {rest}"))
+}
+
 /// The claims for a person: verdict and statement, then, if asked for, what they rest on and how far the inequalities are from failing.
 pub fn claims_in_words(certificate: &Certificate, growth: &[Option<Growth>], in_detail: bool) -> String {
-    let mut text = wrapped(&certificate.document().about, 0);
+    let about = &certificate.document().about;
+    let mut text = if in_detail { wrapped(about, 0) } else { wrapped(&without_constants(about, certificate), 0) };
     let claims = certificate.document().claims.iter().zip(summaries(certificate, growth));
     for (index, (entry, claim)) in claims.enumerate() {
         text.push('\n');
-        let _ = write!(text, "{}: {}", claim.kind, claim.verdict);
+        let _ = write!(text, "{}. {}: {}", index + 1, claim.kind, claim.verdict);
         if let Some(grade) = claim.grade {
             let _ = write!(text, " ({grade})");
         }

@@ -66,12 +66,13 @@ fn grade(grade: verify::Grade) -> Grade {
 }
 
 fn claim_row(claim: &verify::Claim, checked: &Checked, certificate: &Certificate, slowest: Option<f64>) -> Claim {
-    let assumptions = certificate
-        .assumptions()
-        .into_iter()
-        .map(|assumption| Assumption { grade: grade(assumption.grade), text: assumption.text });
+    // The constants are evidence of a grade; the rest says what arm and loop are taken to be.
+    let assumptions = certificate.assumptions().into_iter().enumerate().map(|(index, assumption)| Assumption {
+        grade: (index == 0).then(|| grade(assumption.grade)),
+        text: assumption.text,
+    });
     // The statement alone does not say of which arm, gains and plants it speaks.
-    let about = Assumption { text: certificate.document().about.clone(), grade: Grade::Conditional };
+    let about = Assumption { text: certificate.document().about.clone(), grade: None };
     Claim {
         kind: checked.kind.name().to_owned(),
         verdict: match checked.verdict {

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use certune::verify::{Document, Evidence, seal};
+
 use crate::common::{SHORT, autotune, stdout, urdf};
 
 const PRESET: &str = include_str!("../../presets/pezzato2020-simulation.toml");
@@ -13,6 +15,12 @@ const NO_BODY: &str = r#"<robot name="stick"><link name="base"/>
 <inertia ixx="1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
 <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper_arm"/><axis xyz="0 0 1"/>
 <limit lower="-1" upper="1" effort="10" velocity="1"/></joint></robot>"#;
+
+/// A good link on a joint without an effort.
+const NO_LIMIT: &str = r#"<robot name="stick"><link name="base"/>
+<link name="upper_arm"><inertial><mass value="1"/><origin xyz="0 0 0.1"/>
+<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.1" iyz="0" izz="0.1"/></inertial></link>
+<joint name="shoulder" type="continuous"><parent link="base"/><child link="upper_arm"/><axis xyz="0 0 1"/></joint></robot>"#;
 
 /// Files that are wrong in one way each.
 fn prepare(folder: &Path) {
@@ -39,6 +47,8 @@ fn prepare(folder: &Path) {
     write("backwards.toml", &SHORT.replace("payload_kg = [0, 0.7]", "payload_kg = [0.7, 0]"));
     write("space-twice.toml", &SPACE.replace("[fixed]", "[fixed]\nkappa_mu = 3.0"));
     write("space-start.toml", &SPACE.replace("lower = 50.0", "lower = 5000.0"));
+    write("space-objective.toml", &SPACE.replace("[search]", "[search]\nobjective = \"fastest\""));
+    write("nolimit.urdf", NO_LIMIT);
     write("space-preset.toml", &SPACE.replace("pezzato2020-simulation", "pezato2020-simulation"));
     std::fs::create_dir(folder.join("folder")).unwrap();
     std::fs::create_dir(folder.join("no-run")).unwrap();
@@ -50,6 +60,14 @@ fn prepare(folder: &Path) {
     let edited = whole.replacen("\"11.67\"", "\"11.68\"", 1);
     assert_ne!(edited, whole);
     write("edited.json", &edited);
+    write("unknown-record.json", &on_unknown_record(&whole));
+}
+
+/// The certificate resealed on constants that a record nobody has is said to prove.
+fn on_unknown_record(whole: &str) -> String {
+    let mut document: Document = serde_json::from_str(whole).unwrap();
+    document.constants.evidence = Evidence::Proved { record_sha256: "0".repeat(64) };
+    serde_json::to_string_pretty(&seal(document)).unwrap()
 }
 
 /// What stands in a folder, with sizes.
@@ -85,8 +103,32 @@ const CASES: &[(&str, i32, &[&str])] = &[
     (
         "certify --robot panda --gains pezzato2020-simulation --claim stability",
         1,
-        &["stability", "exponential", "region"],
+        &["stability", "exponential", "region", "adaptive-convergence"],
     ),
+    (
+        "certify --robot panda --gains pezzato2020-simulation --claim region,exponental",
+        1,
+        &["exponental", "did you mean `exponential`?"],
+    ),
+    ("certify --robot panda --gains pezzato2020-simulation --delay 17", 1, &["17", "from 0 to 16"]),
+    ("certify --robot panda --gains pezzato2020-simulation --delay 1.5", 1, &["1.5", "whole number of samples"]),
+    ("certify --robot panda --gains pezzato2020-simulation --torque-limits lots", 1, &["lots", "N m"]),
+    ("certify --robot panda --gains pezzato2020-simulation --torque-limits 0", 1, &["above zero"]),
+    ("certify --robot panda --gains pezzato2020-simulation --over box", 1, &["box", "torus", "scenario"]),
+    ("certify --robot panda --gains pezzato2020-mrac-simulation --at 0,0", 1, &["--at has 2 numbers", "7 joints"]),
+    ("certify --robot panda --gains pezzato2020-simulation --constants missing.json", 1, &["cannot read missing.json"]),
+    (
+        "certify --robot panda --gains pezzato2020-simulation --constants hello.json",
+        1,
+        &["hello.json", "not a record of proved constants", "autotune constants"],
+    ),
+    (
+        "certify --robot nolimit.urdf --gains pezzato2020-simulation --claim region --torque-limits",
+        1,
+        &["no torque limit", "shoulder", "--torque-limits with a number"],
+    ),
+    ("--robot panda --objective certified-radus", 1, &["did you mean `certified-radius`?"]),
+    ("--robot panda --space space-objective.toml", 1, &["space-objective.toml:", "fastest"]),
     ("certify --robot panda --gains pezzato2020-simulation --friction 3..1", 1, &["3 is above 1"]),
     ("certify --robot panda --gains pezzato2020-simulation --friction -1", 1, &["zero or above"]),
     ("certify --robot panda --gains pezzato2020-simulation --friction 1-3", 1, &["`1-3` is not a number"]),
@@ -124,7 +166,6 @@ const CASES: &[(&str, i32, &[&str])] = &[
     ("simulate --robot panda --gains controller.toml", 1, &["`pid`", "`aic`"]),
     ("simulate --robot panda --gains empty.toml", 1, &["empty.toml", "schema"]),
     ("simulate --robot panda --gains bytes.toml", 1, &["bytes.toml"]),
-    ("certify --robot panda --gains pezzato2020-mrac-robot", 1, &["mrac", "simulate"]),
     ("simulate --robot UR5 --gains pezzato2020-robot", 1, &["7 entries", "6, one per joint"]),
     // Scenarios and spaces.
     (
@@ -171,6 +212,8 @@ const CASES: &[(&str, i32, &[&str])] = &[
     ("verify list.json", 1, &["list.json", "not a certificate"]),
     ("verify folder", 1, &["folder"]),
     ("verify missing.json", 1, &["cannot read missing.json"]),
+    ("verify unknown-record.json", 2, &["unknown-record.json", "no record with hash", "--constants"]),
+    ("verify whole.json --constants whole.json", 1, &["not a record of proved constants"]),
     ("verify edited.json", 2, &["edited.json", "edited after it was sealed"]),
     ("verify whole.json edited.json", 2, &["rejected: edited.json"]),
     ("verify edited.json truncated.json", 1, &["rejected: edited.json"]),

@@ -7,6 +7,13 @@ fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(|number| number.as_f64().unwrap()).collect()
 }
 
+/// The figure of that name.
+fn figure(claim: &Value, name: &str) -> f64 {
+    let figures = claim["figures"].as_array().unwrap();
+    let found = figures.iter().find(|figure| figure["name"] == name);
+    found.unwrap_or_else(|| panic!("no figure `{name}` in {claim}"))["value"].as_f64().unwrap()
+}
+
 #[test]
 fn help_and_version_exit_with_0() {
     let folder = tempfile::tempdir().unwrap();
@@ -112,14 +119,14 @@ fn what_certify_writes_verify_accepts() {
     let folder = tempfile::tempdir().unwrap();
     let exponential = "certify --robot panda --gains pezzato2020-simulation --claim exponential --out a.json";
     let made = json(folder.path(), exponential, 0);
-    assert!(made["claims"][0]["rate_per_s"].as_f64().unwrap() >= 0.7);
+    assert!(figure(&made["claims"][0], "rate") >= 0.7);
     assert_eq!(made["claims"][0]["grade"], "conditional");
     let region =
         "certify --robot panda --gains pezzato2020-simulation --claim region --gravity-compensation on --out b.json";
     let without = json(folder.path(), region, 0);
-    assert!(without["claims"][0]["radius_rad"].as_f64().unwrap() >= 0.33);
+    assert!(figure(&without["claims"][0], "radius") >= 0.33);
     let with = json(folder.path(), &format!("{region} --friction 1..3"), 0);
-    assert!(with["claims"][0]["radius_rad"].as_f64().unwrap() >= 0.80);
+    assert!(figure(&with["claims"][0], "radius") >= 0.80);
     let checked = json(folder.path(), "verify a.json b.json", 0);
     assert_eq!(checked[0]["verdict"], "holds");
     assert_eq!(checked[0]["sha256"], made["sha256"]);
@@ -132,9 +139,54 @@ fn what_certify_writes_verify_accepts() {
 fn a_refusal_exits_with_2_and_verifies_as_one() {
     let folder = tempfile::tempdir().unwrap();
     let refused = "certify --robot panda --gains pezzato2020-libfranka --claim exponential --out refused.json";
-    assert!(stdout(folder.path(), refused, 2).contains("eigenvalue"));
+    let words = stdout(folder.path(), refused, 2);
+    assert!(words.contains("eigenvalue") && words.contains("the deviation has grown from 0.001"), "{words}");
+    let simulated = &json(folder.path(), refused, 2)["claims"][0]["simulated"];
+    assert!(simulated["to_rad"].as_f64().unwrap() > 2.0 * simulated["from_rad"].as_f64().unwrap());
     let checked = json(folder.path(), "verify refused.json", 2);
     assert_eq!(checked[0]["claims"][0]["verdict"], "refused");
+}
+
+#[test]
+fn torque_limits_and_a_moving_goal_are_respected_and_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let plant = "certify --robot panda --gains pezzato2020-simulation --gravity-compensation on --friction 1..3 --rotor-inertia 0.1";
+    let free = json(folder.path(), &format!("{plant} --claim region"), 0);
+    let norm = json(folder.path(), &format!("{plant} --claim region --torque-limits 87"), 0);
+    // Without a value, and with another option right behind it.
+    let motors = json(folder.path(), &format!("{plant} --torque-limits --claim region,moving-goal --out m.json"), 0);
+    let radius = |made: &Value| figure(&made["claims"][0], "radius");
+    assert!(radius(&free) > radius(&norm) && radius(&norm) > radius(&motors) && radius(&motors) > 0.05);
+    assert!((figure(&norm["claims"][0], "controller torque") - 87.0).abs() < 1e-9);
+    let moving = motors["claims"].as_array().unwrap().last().unwrap();
+    assert!(moving["kind"] == "moving-goal" && figure(moving, "goal speed") > 0.01);
+    stdout(folder.path(), "verify m.json", 0);
+}
+
+#[test]
+fn gains_of_each_joint_and_adaptive_gains_have_claims_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let kinds = |made: &Value| {
+        let claims = made["claims"].as_array().unwrap();
+        claims.iter().map(|claim| claim["kind"].as_str().unwrap().to_owned()).collect::<Vec<_>>()
+    };
+    let joints = "certify --robot panda --gains pezzato2020-robot --gravity-compensation on --friction 1..3 --claim joint-region";
+    let made = json(folder.path(), joints, 0);
+    assert_eq!(kinds(&made), ["joint-region"]);
+    assert_eq!(made["claims"][0]["grade"], "conditional");
+
+    let adaptive = "certify --robot panda --gains pezzato2020-mrac-simulation --gravity-compensation on";
+    let released = json(folder.path(), adaptive, 2);
+    assert!(kinds(&released).contains(&"adaptive-convergence".to_owned()));
+    assert!(stdout(folder.path(), adaptive, 2).contains("law = \"reference-model\""));
+    let preset = include_str!("../../presets/pezzato2020-mrac-simulation.toml");
+    let equations = preset.replace("released-code", "reference-model");
+    assert_ne!(equations, preset);
+    std::fs::write(folder.path().join("equations.toml"), equations).unwrap();
+    let line = "certify --robot panda --gains equations.toml --gravity-compensation on --claim adaptive-convergence --out e.json";
+    let made = json(folder.path(), line, 0);
+    assert_eq!(made["claims"][0]["verdict"], "holds");
+    stdout(folder.path(), "verify e.json", 0);
 }
 
 #[test]

@@ -55,6 +55,40 @@ fn a_run_is_the_same_to_the_byte_for_any_number_of_threads() {
     assert!(read(at("one").join("report.html")) == page, "`report` makes another page than `tune`");
 }
 
+/// The search is after what the certificate says, so nothing that a solver lets through but the checker does not is worth anything.
+#[test]
+fn a_search_for_the_largest_radius_ends_with_a_certificate_that_has_it() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("short.toml"), SHORT).unwrap();
+    let run = |objective: &str, out: &str| {
+        let line = format!("--robot panda --scenario short.toml --objective {objective} --budget 10 --out {out}");
+        json(folder.path(), &line, 0)
+    };
+    let figure = |run: &serde_json::Value, claim: usize, name: &str| {
+        let figures = run["claims"][claim]["figures"].as_array().unwrap();
+        figures.iter().find(|figure| figure["name"] == name).unwrap()["value"].as_f64().unwrap()
+    };
+    for (objective, claim, name) in [("certified-radius", 1, "radius"), ("certified-rate", 0, "rate")] {
+        let made = run(objective, objective);
+        let record: serde_json::Value =
+            serde_json::from_str(&read(folder.path().join(objective).join("run.json"))).unwrap();
+        assert_eq!(record["question"]["objective"], objective);
+        let evaluations = record["evaluations"].as_array().unwrap();
+        let cost = |index: u64| evaluations[index as usize]["outcome"]["cost"].as_f64().unwrap();
+        let winner = record["winner"].as_u64().unwrap();
+        // Better than the published gains, and exactly what the certificate says.
+        assert!(cost(winner) < cost(0), "{objective}: {} against {}", cost(winner), cost(0));
+        assert!((cost(winner) * figure(&made, claim, name) - 1.0).abs() < 1e-12);
+        for row in record["space"].as_array().unwrap() {
+            let found = evaluations[winner as usize]["gains"][row["gain"].as_str().unwrap()].as_f64().unwrap();
+            let end = |key: &str| row["freedom"][key].as_f64();
+            assert!(end("lower").is_none_or(|lower| lower <= found) && end("upper").is_none_or(|upper| found <= upper));
+        }
+        stdout(folder.path(), &format!("verify {objective}/certificate.json"), 0);
+        assert!(read(folder.path().join(objective).join("report.html")).contains("The search was after the largest"));
+    }
+}
+
 /// A folder with an earlier run's gains and a file of the user's; a run in it that certifies nothing.
 fn uncertified(payload_kg: &str, budget: usize) -> (tempfile::TempDir, serde_json::Value) {
     let folder = tempfile::tempdir().unwrap();

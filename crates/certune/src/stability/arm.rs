@@ -3,17 +3,17 @@
 use std::sync::OnceLock;
 
 use certune_bounds::{ArmBox, BoundsError, Ranges, SampledConstants, SamplingOptions, sampled_constants};
-use certune_certify::{ArmValues, ConstantValues, FamilyValues, Options, Problem, arm_ranges, certify};
+use certune_certify::{ArmValues, ConstantValues, FamilyValues, GoalListValues, Options, Problem, arm_ranges, certify};
 use certune_control::aic::{AicGains, AicParams};
 use certune_dynamics::{Model, Payload, Robot};
-use certune_verify::{Arm, Certificate, ClaimKind, Gains, Number, Record};
+use certune_verify::{Arm, Certificate, ClaimKind, Gains, LoopTiming, Number, Record};
 
 use crate::adaptive::AdaptiveSetting;
 
-use super::constants::{Over, best_record, sampled_values};
+use super::constants::{Over, best_record, sampled_diagonals, sampled_values};
 use super::gains::ArmGains;
 use super::request::{Answer, Effort, Request, TorqueLimits, claims_for};
-use super::{STEP_S, StabilityError};
+use super::{STEP_S, StabilityError, checked};
 
 /// An arm with a family of plants, ready to certify any number of gains.
 ///
@@ -27,6 +27,7 @@ pub struct ArmCertifier<const N: usize> {
     pub(super) members: ArmBox<N>,
     record: Option<Record>,
     sampled: OnceLock<SampledConstants>,
+    diagonals: OnceLock<Option<[Vec<f64>; 2]>>,
 }
 
 impl<const N: usize> ArmCertifier<N> {
@@ -52,7 +53,15 @@ impl<const N: usize> ArmCertifier<N> {
             sha256: robot.sha256(),
             payload_com_m: ranges.payload_com_m,
         };
-        Ok(Self { robot: robot.clone(), arm, family: family.clone(), members, record: None, sampled: OnceLock::new() })
+        Ok(Self {
+            robot: robot.clone(),
+            arm,
+            family: family.clone(),
+            members,
+            record: None,
+            sampled: OnceLock::new(),
+            diagonals: OnceLock::new(),
+        })
     }
 
     /// The same arms with the constants of the best of the records that covers them over the set, if one does.
@@ -90,9 +99,16 @@ impl<const N: usize> ArmCertifier<N> {
     pub(crate) fn problem(&self, gains: Gains) -> Result<Problem, StabilityError> {
         let constants = match &self.record {
             Some(record) => ConstantValues::Proved(Box::new(record.clone())),
-            None => sampled_values(self.constants()),
+            None => sampled_values(self.constants(), self.diagonals(&gains)),
         };
         Ok(Problem::new(&self.arm, gains, &self.family, &constants)?)
+    }
+
+    /// Sampled diagonals, for gains that differ between joints: no other claim looks at them.
+    fn diagonals(&self, gains: &Gains) -> Option<[Vec<f64>; 2]> {
+        let wanted = gains.aic().is_ok_and(|gains| gains.shared_by_all().is_err());
+        let found = || sampled_diagonals(&self.members, self.constants());
+        if wanted { self.diagonals.get_or_init(found).clone() } else { None }
     }
 
     /// Makes the claims about an AIC and has them checked. Whether they hold is for the certificate to say.
@@ -122,22 +138,35 @@ impl<const N: usize> ArmCertifier<N> {
     /// # Errors
     /// As [`ArmCertifier::certify`].
     pub fn answer(&self, gains: &ArmGains<N>, request: &Request) -> Result<Answer, StabilityError> {
-        let claims = if request.claims.is_empty() { claims_for(gains) } else { request.claims.clone() };
+        let goal = request.at_rad.as_deref().and_then(|at| <[f64; N]>::try_from(at).ok());
+        let all = || {
+            let needs_goal = |kind: &ClaimKind| *kind == ClaimKind::Lyapunov && goal.is_none();
+            claims_for(gains).into_iter().filter(|kind| !needs_goal(kind)).collect()
+        };
+        let claims: Vec<ClaimKind> = if request.claims.is_empty() { all() } else { request.claims.clone() };
+        let at_goal = || goal.ok_or(StabilityError::NoConfiguration { joints: N });
         match gains {
             ArmGains::Aic(aic) => {
-                let params = AicParams::new(aic, STEP_S)?;
+                AicParams::new(aic, STEP_S)?;
                 let problem = self.problem(gains.written()?)?;
                 let options = self.options(request)?;
-                let attain = || self.unstable_member(&params, &request.effort.counterexample).ok().flatten();
-                let certificate = certify(&problem, &claims, &options, &attain)?;
+                let attain = |timing: Option<&LoopTiming>| {
+                    self.unstable_member(aic, timing, &request.effort.counterexample).ok().flatten()
+                };
+                // A claim that knows the arm stands behind those that know only its constants.
+                let (at_one, over_all): (Vec<_>, Vec<_>) =
+                    claims.into_iter().partition(|kind| *kind == ClaimKind::Lyapunov);
+                let document = match over_all.as_slice() {
+                    [] => problem.document().clone(),
+                    kinds => certify(&problem, kinds, &options, &attain)?.document().clone(),
+                };
+                let extra = at_one.iter().map(|_| self.lyapunov_at(aic, at_goal()?)).collect::<Result<_, _>>()?;
+                let certificate = checked(document, extra, problem.records())?;
                 Ok(Answer { certificate, records: problem.records().to_vec() })
             }
             ArmGains::Mrac(mrac) => {
-                let goal = request.at_rad.as_deref().and_then(|at| <[f64; N]>::try_from(at).ok());
-                let setting = AdaptiveSetting {
-                    delay_samples: u32::try_from(request.delay_samples).unwrap_or(u32::MAX),
-                    ..AdaptiveSetting::around(goal.ok_or(StabilityError::NoConfiguration { joints: N })?)
-                };
+                let delay_samples = u32::try_from(request.delay_samples.unwrap_or(0)).unwrap_or(u32::MAX);
+                let setting = AdaptiveSetting { delay_samples, ..AdaptiveSetting::around(at_goal()?) };
                 self.answer_adaptive(mrac, &setting, &claims)
             }
         }
@@ -146,8 +175,12 @@ impl<const N: usize> ArmCertifier<N> {
     /// The search as the request wants it.
     fn options(&self, request: &Request) -> Result<Options, StabilityError> {
         let mut options = request.effort.proofs.clone();
+        options.sampled.period_s = STEP_S;
         options.sampled_region.step_s = STEP_S;
-        options.sampled_region.delay_samples = request.delay_samples;
+        if let Some(samples) = request.delay_samples {
+            options.sampled.delay_samples = samples;
+            options.sampled_region.delay_samples = samples;
+        }
         match request.torque_limits {
             TorqueLimits::None => {}
             TorqueLimits::Norm(limit) => {
@@ -157,14 +190,18 @@ impl<const N: usize> ArmCertifier<N> {
             TorqueLimits::LessGravity => {
                 let limits = self.motor_limits_n_m()?;
                 options.sampled_region.torque_limit_n_m = self.left_by_gravity(&limits);
+                options.joint_region.motor_limits_n_m = Some(limits.clone());
                 options.region.motor_limits_n_m = Some(limits);
             }
         }
+        // With a delay in the question the goal moves on the region of the sampled loop.
+        options.moving_goal.sampled_region = request.delay_samples.map(|_| options.sampled_region);
         options.moving_goal.region = options.region.clone();
         options.moving_goal.joint_region = options.joint_region.clone();
         if request.goals.is_some() {
             options.moving_goal.list.clone_from(&request.goals);
         }
+        options.joint_region.steps_rad = request.goals.as_ref().map(steps_rad).unwrap_or_default();
         Ok(options)
     }
 
@@ -185,4 +222,14 @@ impl<const N: usize> ArmCertifier<N> {
         };
         limits_n_m.iter().zip(gravity).map(|(limit, gravity)| limit - gravity).reduce(f64::min)
     }
+}
+
+/// From each goal of a list to the next.
+fn steps_rad(list: &GoalListValues) -> Vec<Vec<f64>> {
+    let goals = list.goals.iter().map(|(goal, _)| goal);
+    let befores = std::iter::once(&list.start_rad).chain(goals.clone());
+    goals
+        .zip(befores)
+        .map(|(goal, before)| goal.iter().zip(before).map(|(goal, before)| goal - before).collect())
+        .collect()
 }

@@ -1,9 +1,11 @@
 //! Which constants a certificate rests on: those of a proved record that covers the family, or sampled ones.
 
-use certune_bounds::SampledConstants;
+use certune_bounds::{ArmBox, SampledConstants, SearchOptions, maximise};
 use certune_certify::{ConstantValues, SampledConstantValues};
-use certune_dynamics::Robot;
+use certune_dynamics::{Model, Robot, mass_matrix};
+use certune_linsys::{JointMatrix, Joints};
 use certune_verify::{Arm, ArmRanges, ConfigurationSet, Number, Record};
+use nalgebra::{DMatrix, SymmetricEigen};
 
 /// The configurations that claims are wanted for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -74,16 +76,56 @@ fn holds(outer: &ConfigurationSet, inner: &ConfigurationSet) -> bool {
     }
 }
 
-/// Sampled constants as a problem takes them: over all angles, whatever smaller set was asked for.
-pub(super) fn sampled_values(found: &SampledConstants) -> ConstantValues {
+/// `diag(lower) <= M <= diag(upper)` over the members, sampled: the shape from the largest diagonal entries of M and of its inverse, the size
+/// from the extreme eigenvalues of M seen in that shape, widened by the margin.
+pub(super) fn sampled_diagonals<const N: usize>(
+    members: &ArmBox<N>,
+    found: &SampledConstants,
+) -> Option<[Vec<f64>; 2]> {
+    let margin = found.margin;
+    let angles = &members.axes()[..N];
+    let ends = |end: usize| members.groups().iter().map(|group| group.scale[end]).collect::<Vec<f64>>();
+    let [rotor_lower, rotor_upper] = members.rotor_inertia_kg_m2();
+    let lightest = members.model(&ends(0), &rotor_lower).ok()?;
+    let heaviest = members.model(&ends(1), &rotor_upper).ok()?;
+    let inertia = |model: &Model<N>, at: &[f64]| mass_matrix(model, &Joints::from_column_slice(at));
+    let inverse = |at: &[f64]| inertia(&lightest, at).try_inverse();
+    let options = SearchOptions {
+        samples: found.samples,
+        local_starts: found.local_starts,
+        evaluations_per_start: 300,
+        ..SearchOptions::default()
+    };
+    let largest = |score: &(dyn Fn(&[f64]) -> f64 + Sync)| maximise(angles, &options, score).ok().map(|top| top.value);
+    // The eigenvalues of S M S, S = diag(scale).
+    let largest_seen = |matrix: JointMatrix<N>, scale: &[f64]| {
+        let seen = DMatrix::from_fn(N, N, |i, j| scale[i] * matrix[(i, j)] * scale[j]);
+        SymmetricEigen::new(seen).eigenvalues.max()
+    };
+    let entry = |joint: usize| largest(&|at| inertia(&heaviest, at)[(joint, joint)]);
+    let inverse_entry = |joint: usize| largest(&|at| inverse(at).map_or(f64::NAN, |matrix| matrix[(joint, joint)]));
+    let upper_shape = (0..N).map(entry).collect::<Option<Vec<f64>>>()?;
+    let lower_shape = (0..N).map(inverse_entry).collect::<Option<Vec<f64>>>()?;
+    let roots = |shape: &[f64]| shape.iter().map(|x| x.sqrt().recip()).collect::<Vec<f64>>();
+    let (upper_root, lower_root) = (roots(&upper_shape), roots(&lower_shape));
+    let upper_size = largest(&|at| largest_seen(inertia(&heaviest, at), &upper_root))?;
+    let lower_size = largest(&|at| inverse(at).map_or(f64::NAN, |matrix| largest_seen(matrix, &lower_root)))?;
+    let upper = upper_shape.iter().map(|x| x * upper_size * (1.0 + margin)).collect();
+    let lower = lower_shape.iter().map(|x| (x * lower_size * (1.0 + margin)).recip()).collect();
+    Some([lower, upper])
+}
+
+/// Sampled constants as a problem takes them: over all angles, whatever smaller set was asked for. What was not sampled itself follows from what was:
+/// `|y| <= |y|_M / sqrt m_lo` gives k_m.
+pub(super) fn sampled_values(found: &SampledConstants, diagonal_kg_m2: Option<[Vec<f64>; 2]>) -> ConstantValues {
     ConstantValues::Sampled(SampledConstantValues {
         m_lo_kg_m2: found.constants.m_lo_kg_m2,
         m_hi_kg_m2: found.constants.m_hi_kg_m2,
         k_g_n_m_per_rad: found.constants.k_g_n_m_per_rad,
         k_c_kg_m2: found.constants.k_c_kg_m2,
         k_r: found.constants.k_r,
-        k_m: None,
-        diagonal_kg_m2: None,
+        k_m: Some(found.constants.k_r / found.constants.m_lo_kg_m2.sqrt()),
+        diagonal_kg_m2,
         gravity_torque_n_m: Some(found.gravity_torque_n_m.clone()),
         margin: found.margin,
         samples: found.samples,

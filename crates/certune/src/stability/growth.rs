@@ -1,20 +1,22 @@
 //! What a refusal looks like in time: the nonlinear loop, let go close to its equilibrium at the arm and configuration that the refusal names.
 //!
 //! The goal is the refusal's configuration; the arm starts at rest beside it, along the joint part of the unstable eigenvector, with the controller at
-//! its equilibrium. The controller runs at [`STEP_S`] tenfold refined, so that what grows is not the sampling's doing. Measured in floating point: an
+//! its equilibrium. In continuous time the controller runs at [`STEP_S`] tenfold refined, so that what grows is not the sampling's doing; a refusal of
+//! the sampled loop is simulated with its own period and delay. Measured in floating point: an
 //! illustration, not evidence.
 
 use std::f64::consts::TAU;
 
 use certune_closed_loop::scenario::{Integrator, Method, Noise};
+use certune_closed_loop::simulate::MAX_DELAY_SAMPLES;
 use certune_closed_loop::task::TaskSegment;
-use certune_closed_loop::{NoiseStream, Plant, PlantSetting, Progress, Simulation, Task, linearise_aic};
-use certune_control::aic::{Aic, AicGains, AicParams, AicState};
+use certune_closed_loop::{NoiseStream, Plant, PlantSetting, Progress, Simulation, Task};
+use certune_control::aic::{Aic, AicGains, AicState};
 use certune_dynamics::{Robot, State, gravity_torque};
 use certune_linsys::Joints;
 use certune_verify::{AicGains as WrittenGains, Document, Number, RefusedClaim};
 
-use super::counterexample::eigenvector;
+use super::counterexample::Time;
 use super::{STEP_S, StabilityError};
 
 /// Length of the run, s.
@@ -57,14 +59,17 @@ pub fn growth<const N: usize>(
             .with_friction(attained.friction_n_m_s_per_rad.to_f64())
             .with_rotor_inertia(attained.rotor_inertia_kg_m2.to_f64())
     };
-    let setting = PlantSetting { coulomb_n_m: vec![0.0; N], ..setting };
+    let Some(time) = Time::new(&gains, refused.sampling.as_ref(), STEP_S / REFINEMENT)? else { return Ok(None) };
+    let delay_samples = time.delay_samples.unwrap_or(0);
+    if delay_samples > MAX_DELAY_SAMPLES {
+        return Ok(None);
+    }
+    let setting = PlantSetting { coulomb_n_m: vec![0.0; N], delay_samples, ..setting };
     let plant = Plant::<N>::new(robot, &setting)?;
-    let step_s = STEP_S / REFINEMENT;
-    let params = AicParams::new(&gains, step_s)?;
-    let closed = linearise_aic(plant.model(), &goal, &params, compensated)?;
-    let eigenvalue = closed.rightmost_eigenvalue();
-    let Some(mode) = eigenvector(closed.matrix(), eigenvalue) else { return Ok(None) };
-    let Some(direction) = Joints::<N>::from_fn(|joint, _| mode[joint].re).try_normalize(0.0) else { return Ok(None) };
+    let step_s = time.params.step_s();
+    let mode = time.worst_mode(plant.model(), &goal, compensated)?;
+    let Some(vector) = mode.vector() else { return Ok(None) };
+    let Some(direction) = Joints::<N>::from_fn(|joint, _| vector[joint].re).try_normalize(0.0) else { return Ok(None) };
 
     let steps = (RUN_S / step_s).round() as u64;
     let task = Task {
@@ -73,12 +78,16 @@ pub fn growth<const N: usize>(
         segments: vec![TaskSegment { goal, steps }],
         torque_limits: false,
         goal_limiter: None,
-        integrator: Integrator { method: Method::RungeKutta4, substeps: 1 },
+        // A sampled refusal is about the semi-implicit step.
+        integrator: Integrator {
+            method: if time.delay_samples.is_some() { Method::SemiImplicitEuler } else { Method::RungeKutta4 },
+            substeps: 1,
+        },
         noise: Noise::default(),
         payloads: Vec::new(),
         pushes: Vec::new(),
     };
-    let controller = Aic::new(&params);
+    let controller = Aic::new(&time.params);
     let mut run = Simulation::new(&plant, &task, &controller, NoiseStream::default());
     let held = if compensated { Joints::zeros() } else { gravity_torque(plant.model(), &goal) };
     run.set_controller_state(AicState { mu: task.start, dmu: Joints::zeros(), ddmu: Joints::zeros(), u: held });
@@ -92,7 +101,7 @@ pub fn growth<const N: usize>(
         }
     };
     // An oscillation passes through zero: look back over one period of it, at most half of the run.
-    let period_s = if eigenvalue.im.abs() > 0.0 { TAU / eigenvalue.im.abs() } else { 0.0 };
+    let period_s = if mode.per_s.im.abs() > 0.0 { TAU / mode.per_s.im.abs() } else { 0.0 };
     let back = ((period_s / step_s).ceil() as usize).clamp(1, course.len().div_ceil(2));
     let to_rad = course.iter().rev().take(back).copied().fold(0.0, f64::max);
     Ok(Some(Growth { after_s, from_rad: START_RAD, to_rad }))

@@ -25,7 +25,7 @@ use certune_closed_loop::{PlantBox, PlantError};
 use certune_control::ParamError;
 use certune_dynamics::RobotError;
 use certune_linsys::LoopError;
-use certune_verify::Certificate;
+use certune_verify::{Certificate, Claim, Document, Record, seal, verify};
 
 pub use arm::ArmCertifier;
 pub use constants::Over;
@@ -108,4 +108,18 @@ pub fn family_of(plant_box: &PlantBox) -> Result<FamilyValues, StabilityError> {
 /// [`StabilityError::Certify`] when it does not serialise, which would be a defect.
 pub fn certificate_text(certificate: &Certificate) -> Result<String, StabilityError> {
     Ok(to_json(certificate.document()).map_err(CertifyError::from)?)
+}
+
+/// The document with more claims behind those it has, checked.
+///
+/// # Errors
+/// [`StabilityError::Certify`] when the checker does not accept it, which would be a defect.
+pub(crate) fn checked(
+    mut document: Document,
+    claims: Vec<Claim>,
+    records: &[Record],
+) -> Result<Certificate, StabilityError> {
+    document.claims.extend(claims.into_iter().map(Into::into));
+    let text = to_json(&seal(document)).map_err(CertifyError::from)?;
+    Ok(verify(&text, records).map_err(CertifyError::from)?.map_err(CertifyError::from)?)
 }

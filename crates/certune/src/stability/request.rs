@@ -47,11 +47,12 @@ impl Default for Effort {
 pub struct Request {
     /// The claims, in this order; empty for all that apply to the gains ([`claims_for`]).
     pub claims: Vec<ClaimKind>,
-    /// Samples from a command to its torque, for the claims about the sampled loop.
-    pub delay_samples: usize,
+    /// Samples from a command to its torque, for the claims about the sampled loop; `None` leaves them as the effort has them, and `moving-goal`
+    /// speaks of continuous time.
+    pub delay_samples: Option<usize>,
     /// Torque limits, for the claims that can respect some.
     pub torque_limits: TorqueLimits,
-    /// The configuration of the claims that are about one, rad: the goal of an adaptive controller.
+    /// The configuration of the claims that are about one, rad: of `lyapunov`, and of an adaptive controller's goal.
     pub at_rad: Option<Vec<f64>>,
     /// Goals that follow each other, for `moving-goal`; without any it speaks of goals in general.
     pub goals: Option<GoalListValues>,
@@ -71,10 +72,15 @@ pub struct Answer {
 /// The claims that apply to a controller with these gains, in the order in which they are examined.
 pub fn claims_for<const N: usize>(gains: &ArmGains<N>) -> Vec<ClaimKind> {
     match gains {
-        ArmGains::Aic(_) if gains.are_shared() => {
-            vec![ClaimKind::Exponential, ClaimKind::Region, ClaimKind::MovingGoal, ClaimKind::SampledRegion]
-        }
-        ArmGains::Aic(_) => vec![ClaimKind::JointRegion],
+        ArmGains::Aic(_) if gains.are_shared() => vec![
+            ClaimKind::Exponential,
+            ClaimKind::Sampled,
+            ClaimKind::Region,
+            ClaimKind::MovingGoal,
+            ClaimKind::SampledRegion,
+            ClaimKind::Disturbance,
+        ],
+        ArmGains::Aic(_) => vec![ClaimKind::JointRegion, ClaimKind::MovingGoal, ClaimKind::Lyapunov],
         ArmGains::Mrac(_) => vec![ClaimKind::AdaptiveConvergence, ClaimKind::PiExponential, ClaimKind::AdaptiveSampled],
     }
 }

@@ -3,7 +3,7 @@
 use certune::control::aic::AicParams;
 use certune::dynamics::{Model, State, forward_dynamics, gravity_torque, mass_matrix, potential_energy};
 use certune::linsys::Joints;
-use certune::verify::RegionClaim;
+use certune::verify::{JointRegionClaim, Number, RegionClaim};
 
 /// State of the loop: q, dq, beliefs mu, mu', mu'', and the controller's torque u.
 #[derive(Clone, Copy, Debug)]
@@ -82,6 +82,37 @@ impl<const N: usize> Loop<'_, N> {
         next
     }
 
+    /// The Lyapunov function of a joint-region's witness; every joint's friction, N m s/rad, between the family's ends.
+    pub fn joint_v(&self, claim: &JointRegionClaim, ends: &[[f64; 2]], friction: &Joints<N>, x: &Continuous<N>) -> f64 {
+        let w = &claim.witness;
+        let z = self.z(x);
+        let pi = mass_matrix(&self.model, &x.q) * x.dq;
+        let mut v = w.p.to_f64() * x.dq.dot(&pi);
+        for (joint, weights) in w.joints.iter().enumerate() {
+            let [d0, d1] = ends[joint];
+            let share = if d1 > d0 { (friction[joint] - d0) / (d1 - d0) } else { 0.0 };
+            let [first, last] = [&weights.s[0], &weights.s[weights.s.len() - 1]];
+            let mut entries = first.iter().zip(last).map(|(a, b)| a.to_f64() * (1.0 - share) + b.to_f64() * share);
+            for i in 0..5 {
+                v += 2.0 * pi[joint] * weights.b[i].to_f64() * z[i][joint];
+                for j in i..5 {
+                    let twice = if i == j { 1.0 } else { 2.0 };
+                    v += twice * entries.next().unwrap() * z[i][joint] * z[j][joint];
+                }
+            }
+        }
+        v + self.potential(&w.p, x)
+    }
+
+    /// `2p (U(q) - U(goal) - g(goal)'e)`, 0 when gravity is compensated.
+    fn potential(&self, p: &Number, x: &Continuous<N>) -> f64 {
+        if self.compensated {
+            return 0.0;
+        }
+        let rise = potential_energy(&self.model, &x.q) - potential_energy(&self.model, &self.goal);
+        2.0 * p.to_f64() * (rise - gravity_torque(&self.model, &self.goal).dot(&(x.q - self.goal)))
+    }
+
     /// The Lyapunov function of a region's witness.
     pub fn v(&self, claim: &RegionClaim, x: &Continuous<N>) -> f64 {
         let w = &claim.witness;
@@ -97,11 +128,7 @@ impl<const N: usize> Loop<'_, N> {
                 v += weight * entries.next().unwrap().to_f64() * z[i].dot(&z[j]);
             }
         }
-        if !self.compensated {
-            let rise = potential_energy(&self.model, &x.q) - potential_energy(&self.model, &self.goal);
-            v += 2.0 * p * (rise - gravity_torque(&self.model, &self.goal).dot(&z[0]));
-        }
-        v
+        v + self.potential(&w.p, x)
     }
 
     /// `dV/dt` along the loop, by a central difference in the direction of motion.

@@ -127,7 +127,7 @@ fn gain(name: &str, unit: &str, (published, tuned): (f64, f64), bounds: Option<(
 }
 
 fn assumption(text: &str, grade: Grade) -> Assumption {
-    Assumption { text: text.to_owned(), grade }
+    Assumption { text: text.to_owned(), grade: Some(grade) }
 }
 
 fn margin(name: &str, value: f64, unit: &str) -> Margin {

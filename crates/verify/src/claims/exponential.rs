@@ -7,24 +7,21 @@
 //! p(s; m, d, g) = m det(s I - A6(m, d, g)),   degree 6, affine in (m, d, g)
 //! ```
 //!
-//! has all roots left of `-rate` on the whole box. By the edge theorem (Bartlett, Hollot, Huang 1988) the twelve edges of the box
-//! settle that. On an edge, from one stable end, a root can only cross the imaginary axis (after the shift `s -> s - rate`) where the
-//! constant coefficient or the Hurwitz determinant of order 5 vanishes: the first is affine, the second a polynomial of degree
-//! at most 5 in the edge's parameter, whose roots in [0, 1] a Sturm sequence counts. The full derivation, with the case `v = 0`, is in
-//! `proofs/claims/exponential.md`.
+//! has all roots left of `-rate` on the whole box, which [`polytope`](crate::polytope) decides from the twelve edges after the shift
+//! `s -> s - rate`. The full derivation, with the case `v = 0`, is in `proofs/claims/exponential.md`.
 
-use num_bigint::BigInt;
 use num_rational::BigRational;
-use num_traits::Signed;
-
+use num_traits::Zero;
 use serde::{Deserialize, Serialize};
 
+use super::variation::{Variation, stays_stable, varied};
 use super::{CONTINUOUS, ClaimKind, Figure, Inequality, Provable};
 use crate::aic::{AicGains, SharedGains};
-use crate::algebra::{Polynomial, characteristic_polynomial, common_integers, hurwitz_determinant, is_hurwitz, zeros};
+use crate::algebra::{characteristic_polynomial, zeros};
 use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::{Number, positive};
+use crate::polytope::{AffineFamily, BoxFlaw};
 use crate::quantity::require_positive;
 
 const DEGREE: usize = 6;
@@ -35,6 +32,8 @@ const DEGREE: usize = 6;
 pub struct ExponentialClaim {
     /// Certified decay rate, 1/s.
     pub rate_per_s: Number,
+    /// How far single bounds of the family may be moved before stability is no longer certified.
+    pub margins: Vec<Variation>,
 }
 
 impl Provable for ExponentialClaim {
@@ -44,8 +43,9 @@ impl Provable for ExponentialClaim {
 
     fn sentence(&self, _: &Document) -> String {
         format!(
-            "linearised at rest at any configuration, the loop is exponentially stable, every mode decaying faster than exp(-{} t), t in s",
-            self.rate_per_s
+            "linearised at rest at any configuration, the loop is exponentially stable, every mode decaying faster than exp(-{} t), t in s{}",
+            self.rate_per_s,
+            stays_stable(&self.margins)
         )
     }
 
@@ -54,14 +54,18 @@ impl Provable for ExponentialClaim {
     }
 
     fn figures(&self) -> Vec<Figure> {
-        vec![Figure { name: "rate", value: self.rate_per_s.clone(), unit: "1/s" }]
+        let rate = Figure { name: "rate", value: self.rate_per_s.clone(), unit: "1/s" };
+        std::iter::once(rate).chain(self.margins.iter().map(Variation::figure)).collect()
     }
 
     fn prove(&self, document: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
         require_positive("rate_per_s", &self.rate_per_s)?;
-        LoopFamily::new(document.gains.aic()?)?
-            .decays_on(&family_box(document), self.rate_per_s.value())
-            .map_err(|reason| Flaw::Polynomial { reason })?;
+        let loops = LoopFamily::new(document.gains.aic()?)?;
+        let decays = |range: &LoopBox, rate: &BigRational| {
+            loops.decays_on(range, rate).map_err(|reason| Flaw::Polynomial { reason })
+        };
+        decays(&family_box(document), self.rate_per_s.value())?;
+        varied(document, &self.margins, &|range| decays(range, &BigRational::zero()))?;
         Ok(Vec::new())
     }
 }
@@ -100,7 +104,7 @@ impl LoopBox {
 #[derive(Clone, Debug)]
 pub struct LoopFamily {
     /// p_0, p_m, p_d, p_g, coefficients from the highest power of s down.
-    parts: [Vec<BigRational>; 4],
+    parts: Vec<Vec<BigRational>>,
 }
 
 impl LoopFamily {
@@ -116,12 +120,13 @@ impl LoopFamily {
         let unit = at(1, 0, 0);
         let by_inertia = minus(&at(2, 0, 0), &unit);
         let (by_friction, by_stiffness) = (minus(&at(1, 1, 0), &unit), minus(&at(1, 0, 1), &unit));
-        Ok(Self { parts: [minus(&unit, &by_inertia), by_inertia, by_friction, by_stiffness] })
+        Ok(Self { parts: vec![minus(&unit, &by_inertia), by_inertia, by_friction, by_stiffness] })
     }
 
     /// The four parts after the substitution `s -> s - rate`.
-    fn shifted(&self, rate: &BigRational) -> [Vec<BigRational>; 4] {
-        self.parts.clone().map(|mut p| {
+    fn shifted(&self, rate: &BigRational) -> AffineFamily {
+        let shift = |part: &Vec<BigRational>| {
+            let mut p = part.clone();
             // Repeated synthetic division at -rate (Taylor shift).
             for last in (1..p.len()).rev() {
                 for k in 1..=last {
@@ -130,13 +135,13 @@ impl LoopFamily {
                 }
             }
             p
-        })
+        };
+        AffineFamily::new(&self.parts.iter().map(shift).collect::<Vec<_>>())
     }
 
     /// Whether the one-joint loop at (inertia, friction, stiffness) decays faster than `exp(-rate t)`. Exact.
     pub fn is_stable_at(&self, point: [&BigRational; 3], rate: &BigRational) -> bool {
-        positive(point[0])
-            && common_integers(&[combined(&self.shifted(rate), point)]).iter().all(|polynomial| is_hurwitz(polynomial))
+        positive(point[0]) && self.shifted(rate).is_hurwitz_at(&point)
     }
 
     /// Whether every loop of the box decays faster than `exp(-rate t)`, by exact arithmetic.
@@ -144,44 +149,28 @@ impl LoopFamily {
     /// # Errors
     /// Where the proof stops, in words.
     pub fn decays_on(&self, range: &LoopBox, rate: &BigRational) -> Result<(), String> {
-        let axes = [&range.inertia, &range.friction, &range.stiffness];
-        if axes.iter().any(|[lower, upper]| lower.value() > upper.value()) {
-            return Err("the box is empty".to_owned());
-        }
         if !positive(range.inertia[0].value()) {
             return Err("the box reaches inertia 0, where the degree drops".to_owned());
         }
-        // Corner k has bit j set where axis j is at its upper end.
-        let parts = self.shifted(rate);
-        let corners: Vec<_> =
-            (0..8_usize).map(|k| combined(&parts, [0, 1, 2].map(|j| axes[j][(k >> j) & 1].value()))).collect();
-        // One factor for all corners: edges join polynomials in their true proportions.
-        let corners = common_integers(&corners);
-        if !is_hurwitz(&corners[0]) {
-            return Err("the loop of the least inertia, friction and stiffness does not decay at this rate".to_owned());
-        }
-        for from in 0..8_usize {
-            for (j, axis) in axes.iter().enumerate() {
-                if from >> j & 1 == 1 || axis[0].value() == axis[1].value() {
-                    continue;
-                }
-                let to = from | 1 << j;
-                if !edge_is_stable(&corners[from], &corners[to]) {
-                    let name = ["inertia", "friction", "stiffness"][j];
-                    return Err(format!("a root reaches the boundary along an edge of the box in {name}"));
-                }
-            }
-        }
-        Ok(())
+        let ranges =
+            [&range.inertia, &range.friction, &range.stiffness].map(|ends| ends.each_ref().map(|x| x.value().clone()));
+        self.shifted(rate).is_hurwitz_on(&ranges).map_err(|flaw| in_words(flaw, &["inertia", "friction", "stiffness"]))
     }
 }
 
-/// `p_0 + m p_m + d p_d + g p_g`.
-fn combined(parts: &[Vec<BigRational>; 4], [m, d, g]: [&BigRational; 3]) -> Vec<BigRational> {
-    let [constant, by_inertia, by_friction, by_stiffness] = parts;
-    (0..constant.len())
-        .map(|k| &constant[k] + &by_inertia[k] * m + &by_friction[k] * d + &by_stiffness[k] * g)
-        .collect()
+/// Where the proof about a box stops, in words.
+pub(crate) fn in_words(flaw: BoxFlaw, axes: &[&str]) -> String {
+    match flaw {
+        BoxFlaw::Empty => "the box is empty".to_owned(),
+        BoxFlaw::FirstCorner => {
+            "the loop of the least inertia, friction and stiffness does not decay at this rate".to_owned()
+        }
+        BoxFlaw::Ends => "a root reaches the boundary on the real axis".to_owned(),
+        BoxFlaw::Edge(axis) => {
+            let name = axes.get(axis).copied().unwrap_or("a parameter");
+            format!("a root reaches the boundary along an edge of the box in {name}")
+        }
+    }
 }
 
 /// Coefficients of `p(s; m, d, g) = m det(s I - A6)` from the highest power down; the first is `m`, which must not be 0.
@@ -200,21 +189,6 @@ fn polynomial(gains: &SharedGains, [m, d, g]: [BigRational; 3]) -> Vec<BigRation
     a[1][1] = -d / &m;
     a[1][5] = m.recip();
     characteristic_polynomial(&a).into_iter().map(|c| c * &m).collect()
-}
-
-/// Whether no polynomial between two of equal positive leading sign has a root on the imaginary axis.
-fn edge_is_stable(from: &[BigInt], to: &[BigInt]) -> bool {
-    let both_positive = |index: usize| from[index].is_positive() && to[index].is_positive();
-    if !both_positive(0) || !both_positive(DEGREE) {
-        return false;
-    }
-    let values: Vec<BigInt> = (0..DEGREE)
-        .map(|node| {
-            let p: Vec<BigInt> = from.iter().zip(to).map(|(a, b)| a + (b - a) * node).collect();
-            hurwitz_determinant(&p, DEGREE - 1)
-        })
-        .collect();
-    Polynomial::through(&values).has_no_root_in_unit_interval()
 }
 
 #[cfg(test)]
@@ -245,12 +219,15 @@ mod tests {
             let [m, d, g] = [point.0, point.1, point.2].map(|x| ratio(x, 7));
             let rate = ratio(rate, 11);
             let family = LoopFamily::new(&gains).unwrap();
-            let shifted = combined(&family.shifted(&rate), [&m, &d, &g]);
+            let shifted = family.shifted(&rate).at(&[&m, &d, &g]);
             let direct = polynomial(&shared, [m, d, g]);
             let value = |p: &[BigRational], s: &BigRational| p.iter().fold(ratio(0, 1), |sum, c| sum * s + c);
+            let shifted: Vec<_> = shifted.into_iter().map(BigRational::from_integer).collect();
+            let factor = &shifted[0] / &direct[0];
+            prop_assert!(positive(&factor));
             for s in 0..8 {
                 let s = ratio(s, 3);
-                prop_assert_eq!(value(&shifted, &s), value(&direct, &(&s - &rate)));
+                prop_assert_eq!(value(&shifted, &s), &factor * value(&direct, &(&s - &rate)));
             }
         }
     }

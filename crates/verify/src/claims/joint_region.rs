@@ -173,29 +173,27 @@ fn bracketed(numbers: &[Number]) -> String {
 /// # Errors
 /// [`Flaw`] when the numbers are outside what the proof allows.
 pub fn joint_region_inequalities(document: &Document, claim: &JointRegionClaim) -> Result<Vec<Inequality>, Flaw> {
-    claim.check(document)?;
+    let joints = claim.joints(document)?;
     let torques = claim.motor_limits_n_m.as_ref().map(|limits| controller_share(document, limits)).transpose()?;
     let inverse_square = |x: &BigRational| (x * x).recip();
     let mut all = Vec::new();
-    for (joint, weights) in claim.witness.joints.iter().enumerate() {
-        let problem = JointProblem::new(document, joint)?;
-        require_length("s", weights.s.len(), problem.friction.len())?;
-        for ((friction, s), end) in problem.friction.iter().zip(&weights.s).zip(["least", "largest"]) {
-            let point = claim.point(&problem.plant, &weights.b, s)?;
+    for (position, joint) in joints.iter().enumerate() {
+        let problem = &joint.problem;
+        for ((end, point), friction) in joint.points().zip(&problem.friction) {
             let mut record = |name: &str, form: &Form<BigRational>| {
-                let name = format!("{name} of joint {} at the {end} friction", joint + 1);
+                let name = format!("{name} of joint {} at the {end} friction", joint.index);
                 all.push(Inequality::decide(name, &form.0));
             };
-            record("containment", &problem.containment(&point));
-            record("decay", &problem.decay(&point, claim.rate_per_s.value(), friction));
-            if let Some(most) = torques.as_ref().and_then(|torques| torques.get(joint)) {
-                record("torque", &problem.within(&point, State::Torque, &inverse_square(most)));
+            record("containment", &problem.containment(point));
+            record("decay", &problem.decay(point, claim.rate_per_s.value(), friction));
+            if let Some(most) = torques.as_ref().and_then(|torques| torques.get(position)) {
+                record("torque", &problem.within(point, State::Torque, &inverse_square(most)));
             }
-            if let Some(most) = claim.distances_rad.as_ref().and_then(|distances| distances.get(joint)) {
-                record("distance", &problem.within(&point, State::Position, &inverse_square(most.value())));
+            if let Some(most) = claim.distances_rad.as_ref().and_then(|distances| distances.get(position)) {
+                record("distance", &problem.within(point, State::Position, &inverse_square(most.value())));
             }
-            let radius = &claim.radii_rad[joint];
-            record("start", &problem.plant.start(&point, &inverse_square(radius.value())));
+            let radius = &claim.radii_rad[position];
+            record("start", &problem.plant.start(point, &inverse_square(radius.value())));
         }
     }
     if let Some(CoveredSteps { steps_rad, covered_share }) = &claim.steps {
@@ -210,6 +208,21 @@ pub fn joint_region_inequalities(document: &Document, claim: &JointRegionClaim) 
     Ok(all)
 }
 
+/// One joint of a claim, with the witness as numbers at each end of its friction.
+struct ClaimedJoint {
+    /// Counted from 1.
+    index: usize,
+    problem: JointProblem<BigRational>,
+    points: Vec<Point<BigRational>>,
+}
+
+impl ClaimedJoint {
+    /// The ends of the friction, named.
+    fn points(&self) -> impl Iterator<Item = (&'static str, &Point<BigRational>)> {
+        ["least", "largest"].into_iter().zip(&self.points)
+    }
+}
+
 impl JointRegionClaim {
     /// Weights of a goal step: with gravity compensated, V at rest at the old goal is at most `sum_i s_i step_i^2` for the new one.
     ///
@@ -217,16 +230,22 @@ impl JointRegionClaim {
     /// [`Flaw`] when the claim is about uncompensated gravity or its witness has the wrong length.
     pub fn start_weights(&self, document: &Document) -> Result<Vec<BigRational>, Flaw> {
         require_compensation(document)?;
-        let mut weights = Vec::new();
-        for JointWeights { b, s } in &self.witness.joints {
-            let mut largest: Option<BigRational> = None;
-            for s in s {
-                let weight = Energy::of(&self.witness.p, b, s)?.start_weight();
-                largest = Some(largest.map_or(weight.clone(), |other| other.max(weight)));
-            }
-            weights.push(largest.ok_or(Flaw::Length { quantity: "s", found: 0, expected: 1 })?);
-        }
-        Ok(weights)
+        let largest = |joint: &ClaimedJoint| {
+            joint.points.iter().map(|point| point.energy.start_weight()).max().unwrap_or_else(BigRational::zero)
+        };
+        Ok(self.joints(document)?.iter().map(largest).collect())
+    }
+
+    /// Every joint with its witness, once the claim's own numbers are what the proof allows.
+    fn joints(&self, document: &Document) -> Result<Vec<ClaimedJoint>, Flaw> {
+        self.check(document)?;
+        let claimed = |(index, JointWeights { b, s }): (usize, &JointWeights)| {
+            let problem = JointProblem::new(document, index)?;
+            require_length("s", s.len(), problem.friction.len())?;
+            let points = s.iter().map(|s| self.point(&problem.plant, b, s)).collect::<Result<_, _>>()?;
+            Ok(ClaimedJoint { index: index + 1, problem, points })
+        };
+        self.witness.joints.iter().enumerate().map(claimed).collect()
     }
 
     /// Whether the claim's own numbers are what the proof allows.
@@ -304,14 +323,13 @@ impl Normed for JointRegionClaim {
     }
 
     fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
+        // V is at least a sum over joints, so the same bound in each joint bounds the 2-norm.
         let closeness = (most * most).recip();
         let mut all = Vec::new();
-        for (joint, weights) in self.witness.joints.iter().enumerate() {
-            let problem = JointProblem::new(document, joint)?;
-            for (s, end) in weights.s.iter().zip(["least", "largest"]) {
-                let point = self.point(&problem.plant, &weights.b, s)?;
-                let form = problem.within(&point, State::Position, &closeness);
-                let name = format!("distance of joint {} at the {end} friction", joint + 1);
+        for joint in self.joints(document)? {
+            for (end, point) in joint.points() {
+                let form = joint.problem.within(point, State::Position, &closeness);
+                let name = format!("distance of joint {} at the {end} friction", joint.index);
                 all.push(Inequality::decide(name, &form.0));
             }
         }

@@ -6,18 +6,21 @@ mod disturbance;
 mod energy;
 mod exponential;
 mod joint_region;
+mod lyapunov;
 mod moving_goal;
 mod not_proved;
 mod pi_exponential;
 mod refused;
 mod region;
+mod sampled;
 mod sampled_motion;
 mod sampled_region;
+mod variation;
 
 use num_rational::BigRational;
 use serde::{Deserialize, Serialize};
 
-use crate::algebra::{Matrix, positive_definite_pivots};
+use crate::algebra::{Matrix, positive_definite_pivots, positive_definite_rounded};
 use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
@@ -28,19 +31,23 @@ pub use adaptive_convergence::{
 pub use adaptive_sampled::{AdaptiveSampledClaim, AdaptiveSampledRefusedClaim};
 pub use disturbance::{DisturbanceClaim, DisturbanceWitness, DisturbedArm, disturbance_inequalities};
 pub use energy::{Energy, Plant, Point, State, TRIANGLE, triangle};
+pub(crate) use exponential::in_words;
 pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
 pub use joint_region::{
     CoveredSteps, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights, joint_region_inequalities,
 };
+pub use lyapunov::{LyapunovClaim, LyapunovRefusedClaim, LyapunovWitness, PlaneRegion, Polytope};
 pub use moving_goal::{GoalList, ListedGoal, MovingGoalClaim, moving_goal_inequalities};
 pub use not_proved::{NotProvedClaim, Reason};
 pub use pi_exponential::{PiExponentialClaim, PiRefusedClaim, pi_inequalities};
 pub use refused::{Attained, BoxPoint, RefusedClaim};
 pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
+pub use sampled::{LoopTiming, SampledClaim};
 pub use sampled_motion::{Coordinates, Corner, Reach, SampledLoop, SampledUnknowns};
 pub use sampled_region::{
     Compensation, SampledRegionClaim, SampledRegionWitness, Sampling, sampled_loop, sampled_region_inequalities,
 };
+pub use variation::{Quantity, Variation};
 
 /// What an entry of a document claims.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,6 +55,8 @@ pub use sampled_region::{
 pub enum Claim {
     /// Every linearised loop of the family decays at a rate.
     Exponential(ExponentialClaim),
+    /// Every linearised loop of the family decays when the controller is sampled and delayed.
+    Sampled(Box<SampledClaim>),
     /// The nonlinear loop decays from every start in a ball.
     Region(Box<RegionClaim>),
     /// The adaptive loop's error converges.
@@ -55,19 +64,23 @@ pub enum Claim {
     /// No function of the form that `adaptive-convergence` needs falls.
     AdaptiveRefused(Box<AdaptiveRefusedClaim>),
     /// The adaptive loop decays when its adaptation is frozen.
-    PiExponential(PiExponentialClaim),
+    PiExponential(Box<PiExponentialClaim>),
     /// It does not, for one joint and inertia.
-    PiRefused(PiRefusedClaim),
+    PiRefused(Box<PiRefusedClaim>),
     /// The adaptive loop's velocity loop survives sampling and delay.
-    AdaptiveSampled(AdaptiveSampledClaim),
+    AdaptiveSampled(Box<AdaptiveSampledClaim>),
     /// It does not, because of one joint.
-    AdaptiveSampledRefused(AdaptiveSampledRefusedClaim),
+    AdaptiveSampledRefused(Box<AdaptiveSampledRefusedClaim>),
     /// The same with gains, frictions and limits of each joint.
     JointRegion(Box<JointRegionClaim>),
     /// The state stays in the region of an earlier entry while the goal moves.
     MovingGoal(Box<MovingGoalClaim>),
     /// The sampled nonlinear loop decays from every start in a ball.
     SampledRegion(Box<SampledRegionClaim>),
+    /// Every matrix of a polytope has its eigenvalues in a region.
+    Lyapunov(Box<LyapunovClaim>),
+    /// One of them has not.
+    LyapunovRefused(Box<LyapunovRefusedClaim>),
     /// The error stays bounded under bounded noise and pushes.
     Disturbance(Box<DisturbanceClaim>),
     /// A claim that does not hold for the family's box, with the point that breaks it.
@@ -80,16 +93,19 @@ impl Claim {
     pub(crate) fn provable(&self) -> &dyn Provable {
         match self {
             Self::Exponential(claim) => claim,
+            Self::Sampled(claim) => claim.as_ref(),
             Self::Region(claim) => claim.as_ref(),
             Self::AdaptiveConvergence(claim) => claim.as_ref(),
             Self::AdaptiveRefused(claim) => claim.as_ref(),
-            Self::PiExponential(claim) => claim,
-            Self::PiRefused(claim) => claim,
-            Self::AdaptiveSampled(claim) => claim,
-            Self::AdaptiveSampledRefused(claim) => claim,
+            Self::PiExponential(claim) => claim.as_ref(),
+            Self::PiRefused(claim) => claim.as_ref(),
+            Self::AdaptiveSampled(claim) => claim.as_ref(),
+            Self::AdaptiveSampledRefused(claim) => claim.as_ref(),
             Self::JointRegion(claim) => claim.as_ref(),
             Self::MovingGoal(claim) => claim.as_ref(),
             Self::SampledRegion(claim) => claim.as_ref(),
+            Self::Lyapunov(claim) => claim.as_ref(),
+            Self::LyapunovRefused(claim) => claim.as_ref(),
             Self::Disturbance(claim) => claim.as_ref(),
             Self::Refused(claim) => claim.as_ref(),
             Self::NotProved(claim) => claim,
@@ -104,11 +120,23 @@ impl Claim {
     /// What a checked entry of this kind amounts to.
     pub fn verdict(&self) -> Verdict {
         match self {
-            Self::Refused(_) | Self::AdaptiveRefused(_) | Self::PiRefused(_) | Self::AdaptiveSampledRefused(_) => {
-                Verdict::Refused
-            }
+            Self::Refused(_)
+            | Self::AdaptiveRefused(_)
+            | Self::PiRefused(_)
+            | Self::AdaptiveSampledRefused(_)
+            | Self::LyapunovRefused(_) => Verdict::Refused,
             Self::NotProved(_) => Verdict::NotProved,
-            _ => Verdict::Holds,
+            Self::Exponential(_)
+            | Self::Sampled(_)
+            | Self::Region(_)
+            | Self::JointRegion(_)
+            | Self::MovingGoal(_)
+            | Self::SampledRegion(_)
+            | Self::Disturbance(_)
+            | Self::AdaptiveConvergence(_)
+            | Self::PiExponential(_)
+            | Self::AdaptiveSampled(_)
+            | Self::Lyapunov(_) => Verdict::Holds,
         }
     }
 
@@ -202,6 +230,9 @@ pub struct Figure {
     pub unit: &'static str,
 }
 
+/// Rational LDL' of dyadic matrices is quick up to this order.
+const LARGEST_EXACT_ORDER: usize = 12;
+
 /// A positive definite matrix of a proof, with the smallest pivot of its LDL'.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inequality {
@@ -217,6 +248,15 @@ impl Inequality {
     /// Decides by exact LDL' whether the matrix is positive definite.
     pub(crate) fn decide(name: String, matrix: &Matrix) -> Self {
         let smallest_pivot = positive_definite_pivots(matrix).and_then(|pivots| pivots.into_iter().min());
+        Self { name, order: matrix.len(), smallest_pivot }
+    }
+
+    /// The same for a matrix of any order: beyond [`LARGEST_EXACT_ORDER`] by the integers just below an equilibrated matrix.
+    pub(crate) fn decide_large(name: String, matrix: &Matrix) -> Self {
+        if matrix.len() <= LARGEST_EXACT_ORDER {
+            return Self::decide(name, matrix);
+        }
+        let smallest_pivot = positive_definite_rounded(matrix).and_then(|pivots| pivots.into_iter().min());
         Self { name, order: matrix.len(), smallest_pivot }
     }
 }

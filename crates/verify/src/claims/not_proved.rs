@@ -2,6 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::refused::check_remedies;
+use super::sampled::{LoopTiming, milliseconds};
+use super::variation::{Variation, would_be_stable};
 use super::{ClaimKind, Inequality, Provable};
 use crate::document::Document;
 use crate::error::Flaw;
@@ -14,10 +17,14 @@ use crate::quantity::require_plain;
 pub struct NotProvedClaim {
     /// Which claim was attempted.
     pub of: ClaimKind,
+    /// How the loop was to be sampled, when the claim was `sampled`.
+    pub sampling: Option<LoopTiming>,
     /// How far the inequalities are from feasible in the solver's units; positive is infeasible.
     pub distance: Option<Number>,
     /// Why no proof was attempted or found.
     pub reason: Reason,
+    /// Changes of the family with which every linearised loop is stable, each checked exactly.
+    pub remedies: Vec<Variation>,
 }
 
 /// Why there is neither a proof nor a counterexample.
@@ -85,14 +92,24 @@ impl Provable for NotProvedClaim {
             .as_ref()
             .map(|d| format!(" Distance to feasibility: {d} in the solver's units."))
             .unwrap_or_default();
-        format!("Not proved ({}): {}.{distance}", self.of.name(), self.reason.in_words())
+        let sampled = self
+            .sampling
+            .as_ref()
+            .map(|s| format!(", {}, with delays up to {} ms", s.in_words(), milliseconds(&s.delay_s)))
+            .unwrap_or_default();
+        let remedies = would_be_stable(&self.remedies);
+        format!("Not proved ({}{sampled}): {}.{distance}{remedies}", self.of.name(), self.reason.in_words())
     }
 
     fn scope(&self, _: &Document) -> String {
         String::new()
     }
 
-    fn prove(&self, _: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
+    fn prove(&self, document: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
+        if let Some(sampling) = &self.sampling {
+            sampling.check()?;
+        }
+        check_remedies(document, self.of, self.sampling.as_ref(), &self.remedies)?;
         if let Some(distance) = &self.distance {
             require_plain("distance", distance)?;
         }

@@ -3,14 +3,17 @@
 use std::fmt::Write as _;
 
 use num_rational::BigRational;
-use num_traits::Signed;
+use num_traits::{Signed, Zero};
 use serde::{Deserialize, Serialize};
 
-use super::{ClaimKind, Inequality, LoopFamily, Provable, family_box};
+use super::sampled::{LoopTiming, milliseconds};
+use super::variation::{Variation, varied, would_be_stable};
+use super::{ClaimKind, Inequality, LoopBox, LoopFamily, Provable, family_box};
 use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
 use crate::quantity::{require, require_at_least_zero, require_length, require_plain, require_within};
+use crate::sampled_loops::SampledFamily;
 
 /// A point of the family's box.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,14 +49,18 @@ pub struct Attained {
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RefusedClaim {
-    /// Which claim is refused: `exponential`.
+    /// Which claim is refused: `exponential` or `sampled`.
     pub of: ClaimKind,
+    /// How the refused loop is sampled, with the very delay at which it fails, a whole number of samples; none in continuous time.
+    pub sampling: Option<LoopTiming>,
     /// The rate that was asked for, 1/s; 0 asks for stability alone.
     pub rate_per_s: Number,
     /// The loop at this point does not decay at that rate; exact.
     pub point: BoxPoint,
     /// An arm and configuration at that point, when one was found.
     pub attained: Option<Attained>,
+    /// Changes of the family with which every linearised loop is stable, each checked exactly.
+    pub remedies: Vec<Variation>,
 }
 
 impl Provable for RefusedClaim {
@@ -67,8 +74,13 @@ impl Provable for RefusedClaim {
         } else {
             "is not asymptotically stable".to_owned()
         };
+        let sampled = self
+            .sampling
+            .as_ref()
+            .map(|s| format!(", {} and a delay of {} ms,", s.in_words(), milliseconds(&s.delay_s)))
+            .unwrap_or_default();
         let mut text = format!(
-            "Refused: the linearised loop with inertia {} kg m^2, friction {} N m s/rad and gravity stiffness {} N m/rad {wanted}.",
+            "Refused: the linearised loop{sampled} with inertia {} kg m^2, friction {} N m s/rad and gravity stiffness {} N m/rad {wanted}.",
             self.point.inertia_kg_m2, self.point.friction_n_m_s_per_rad, self.point.stiffness_n_m_per_rad
         );
         match &self.attained {
@@ -87,6 +99,7 @@ impl Provable for RefusedClaim {
                 " The point lies in the family's box of constants but is not shown attainable by an arm of the family.",
             ),
         }
+        text.push_str(&would_be_stable(&self.remedies));
         text
     }
 
@@ -95,9 +108,6 @@ impl Provable for RefusedClaim {
     }
 
     fn prove(&self, document: &Document, _: usize) -> Result<Vec<Inequality>, Flaw> {
-        if self.of != ClaimKind::Exponential {
-            return Err(Flaw::Counterexample { reason: "no claim of this kind is refused by a point of the box" });
-        }
         let coordinates =
             [&self.point.inertia_kg_m2, &self.point.friction_n_m_s_per_rad, &self.point.stiffness_n_m_per_rad];
         require_at_least_zero("rate_per_s", &self.rate_per_s)?;
@@ -108,14 +118,76 @@ impl Provable for RefusedClaim {
         if !family_box(document).contains(values) {
             return Err(Flaw::Counterexample { reason: "the point lies outside the family's box" });
         }
-        if LoopFamily::new(document.gains.aic()?)?.is_stable_at(values, self.rate_per_s.value()) {
-            return Err(Flaw::Counterexample { reason: "the loop at the point decays at the rate" });
+        if !linearised_loop(document, self.of, self.sampling.as_ref())?.fails_at(values, self.rate_per_s.value())? {
+            return Err(Flaw::Counterexample { reason: "the loop at the point is not shown to miss the rate" });
         }
+        check_remedies(document, self.of, self.sampling.as_ref(), &self.remedies)?;
         if let Some(attained) = &self.attained {
             check_attained(document, &self.point, &self.rate_per_s, attained)?;
         }
         Ok(Vec::new())
     }
+}
+
+/// The linearised loops that a claim is about.
+enum LinearisedLoop<'a> {
+    Continuous(LoopFamily),
+    Sampled(SampledFamily, &'a LoopTiming),
+}
+
+fn linearised_loop<'a>(
+    document: &Document,
+    of: ClaimKind,
+    sampling: Option<&'a LoopTiming>,
+) -> Result<LinearisedLoop<'a>, Flaw> {
+    match (of, sampling) {
+        (ClaimKind::Exponential, None) => Ok(LinearisedLoop::Continuous(LoopFamily::new(document.gains.aic()?)?)),
+        (ClaimKind::Sampled, Some(sampling)) => {
+            sampling.check()?;
+            Ok(LinearisedLoop::Sampled(SampledFamily::new(document.gains.aic()?, &sampling.period_s)?, sampling))
+        }
+        _ => Err(Flaw::Counterexample { reason: "no claim of this kind speaks of linearised loops of the box" }),
+    }
+}
+
+impl LinearisedLoop<'_> {
+    fn fails_at(&self, point: [&BigRational; 3], rate: &BigRational) -> Result<bool, Flaw> {
+        match self {
+            Self::Continuous(loops) => Ok(!loops.is_stable_at(point, rate)),
+            Self::Sampled(loops, sampling) => {
+                if !rate.is_zero() {
+                    return Err(Flaw::Counterexample { reason: "a sampled loop is refused at rate 0 only" });
+                }
+                let Some(samples) = sampling.whole_samples() else {
+                    return Err(Flaw::Counterexample { reason: "the delay is not a whole number of samples" });
+                };
+                Ok(loops.fails_at(sampling.plant, point, samples, rate))
+            }
+        }
+    }
+
+    fn stable_on(&self, range: &LoopBox) -> Result<(), Flaw> {
+        let zero = BigRational::zero();
+        match self {
+            Self::Continuous(loops) => loops.decays_on(range, &zero),
+            Self::Sampled(loops, sampling) => loops.decays_on(sampling.plant, range, &sampling.delay_samples(), &zero),
+        }
+        .map_err(|reason| Flaw::Polynomial { reason })
+    }
+}
+
+/// Every remedy makes every linearised loop stable.
+pub(crate) fn check_remedies(
+    document: &Document,
+    of: ClaimKind,
+    sampling: Option<&LoopTiming>,
+    remedies: &[Variation],
+) -> Result<(), Flaw> {
+    if remedies.is_empty() {
+        return Ok(());
+    }
+    let loops = linearised_loop(document, of, sampling)?;
+    varied(document, remedies, &|range| loops.stable_on(range))
 }
 
 fn signed(x: &Number) -> String {

@@ -51,7 +51,7 @@ impl Corner<BigRational> {
 
 /// A bound `kinetic |dq|_M^2 + torque h^2 |tau|_M^-1^2`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bound<T> {
+struct Bound<T> {
     kinetic: T,
     torque: T,
 }
@@ -277,6 +277,12 @@ impl<T: Field> SampledLoop<T> {
         [motion.torque, motion.torque_behind]
     }
 
+    /// The states z at the sample and at the next.
+    pub fn states(&self, reach: Reach) -> [Vec<Row<T>>; 2] {
+        let motion = self.motion(reach);
+        [motion.before, motion.after]
+    }
+
     /// Samples of delay.
     pub fn delay(&self) -> usize {
         self.delay
@@ -302,9 +308,10 @@ impl<T: Field> SampledLoop<T> {
         self.coriolis_relative.is_some()
     }
 
-    /// Square of `alpha` in the bound on the mean velocity.
-    pub fn remainder(&self) -> &T {
-        &self.ahead.kinetic
+    /// Weights of `|dq|_M^2` and `h^2 |tau|_M^-1^2` in the bound on the mean velocity's remainder: of the period that starts, and of the
+    /// one that ended.
+    pub fn mean_bounds(&self) -> [[&T; 2]; 2] {
+        [&self.ahead, &self.behind].map(|bound| [&bound.kinetic, &bound.torque])
     }
 
     /// The controller's period, s.
@@ -417,6 +424,15 @@ impl<T: Field> SampledLoop<T> {
         let motion = self.motion(Reach::Sample);
         let mut form = self.value(&motion, x, at);
         self.add_bound(&mut form, &-T::one(), &self.speed, &motion.dq, &motion.torque, at);
+        self.add_behind(&mut form, [&-x.growth[0].clone(), &-x.growth[1].clone()], &motion, at);
+        form
+    }
+
+    /// `V - inverse_square |e|^2` with the multipliers of growth.
+    pub(crate) fn distance(&self, x: &SampledUnknowns<T>, at: &Corner<T>, inverse_square: &T) -> Form<T> {
+        let motion = self.motion(Reach::Sample);
+        let mut form = self.value(&motion, x, at);
+        form.add(&-inverse_square.clone(), &motion.before[0], &motion.before[0]);
         self.add_behind(&mut form, [&-x.growth[0].clone(), &-x.growth[1].clone()], &motion, at);
         form
     }

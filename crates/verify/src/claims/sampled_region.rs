@@ -20,11 +20,12 @@ use num_rational::BigRational;
 use num_traits::{One, Signed, Zero};
 use serde::{Deserialize, Serialize};
 
-use super::sampled_motion::{Corner, Reach, SampledLoop, SampledUnknowns};
+use super::sampled_motion::{Corner, SampledLoop, SampledUnknowns};
 use super::{ClaimKind, Figure, Inequality, Provable, all_hold};
-use crate::algebra::{Matrix, zeros};
+use crate::algebra::zeros;
 use crate::document::{ConfigurationSet, Document};
 use crate::error::Flaw;
+use crate::form::Form;
 use crate::normed::{Norm, Normed};
 use crate::number::{Number, positive, unit_interval};
 use crate::quantity::{require, require_length, require_positive};
@@ -112,6 +113,16 @@ impl SampledRegionClaim {
         let s = symmetric("s", &self.witness.s, states(self.sampling.delay_samples)?)?;
         Ok(&s[0][0] + &s[0][1] + &s[1][0] + &s[1][1])
     }
+
+    /// What shows that `V <= 1` implies `|e| <= most` (2-norm over the joints, rad) at the samples.
+    ///
+    /// # Errors
+    /// [`Flaw`] when the numbers are outside what the proof allows.
+    pub fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
+        let proof = Proof::new(document, self)?;
+        let inverse_square = (most * most).recip();
+        Ok(proof.at_corners("distance", |corner| Some(proof.motion.distance(&proof.unknowns, corner, &inverse_square))))
+    }
 }
 
 impl Provable for SampledRegionClaim {
@@ -176,17 +187,7 @@ impl Normed for SampledRegionClaim {
     }
 
     fn error_within(&self, document: &Document, most: &BigRational) -> Result<Vec<Inequality>, Flaw> {
-        let motion = sampled_loop(document, &self.sampling, &self.witness.rho, &self.witness.speed)?;
-        let unknowns = unknowns(&self.witness, self.sampling.delay_samples)?;
-        let error = motion.coordinates(Reach::Sample).error;
-        let closeness = (most * most).recip();
-        // With the multipliers of `growth`, whose other terms are not negative.
-        let at = |(index, corner): (usize, &Corner<BigRational>)| {
-            let mut form = motion.growth(&unknowns, corner).0;
-            form[error][error] -= &closeness;
-            Inequality::decide(format!("distance at corner {} of the inertia interval", index + 1), &form)
-        };
-        Ok(corners(document, &self.witness)?.iter().enumerate().map(at).collect())
+        Self::error_within(self, document, most)
     }
 }
 
@@ -203,29 +204,46 @@ fn states(delay: usize) -> Result<usize, Flaw> {
 /// # Errors
 /// [`Flaw`] when the numbers are outside what the proof allows.
 pub fn sampled_region_inequalities(document: &Document, claim: &SampledRegionClaim) -> Result<Vec<Inequality>, Flaw> {
-    let SampledRegionClaim { radius_rad, sampling, witness } = claim;
-    require_positive("radius_rad", radius_rad)?;
-    let motion = sampled_loop(document, sampling, &witness.rho, &witness.speed)?;
-    let unknowns = unknowns(witness, sampling.delay_samples)?;
-    if motion.coriolis_relative.is_none() && !unknowns.theta.is_one() {
-        return Err(Flaw::Missing { constant: "k_r" });
-    }
-    let mut all = Vec::new();
-    for (index, corner) in corners(document, witness)?.iter().enumerate() {
-        let mut record = |what: &str, matrix: &Matrix| {
-            all.push(Inequality::decide(format!("{what} at corner {} of the inertia interval", index + 1), matrix));
-        };
-        record("growth", &motion.growth(&unknowns, corner).0);
-        record("containment", &motion.containment(&unknowns, corner).0);
-        record("decay", &motion.decay(&unknowns, corner).0);
-        if let Some(torque) = motion.torque(&unknowns, corner) {
-            record("torque", &torque.0);
-        }
-    }
-    let radius = radius_rad.value();
+    require_positive("radius_rad", &claim.radius_rad)?;
+    let proof = Proof::new(document, claim)?;
+    let Proof { motion, unknowns, .. } = &proof;
+    let mut all = proof.at_corners("growth", |corner| Some(motion.growth(unknowns, corner)));
+    all.extend(proof.at_corners("containment", |corner| Some(motion.containment(unknowns, corner))));
+    all.extend(proof.at_corners("decay", |corner| Some(motion.decay(unknowns, corner))));
+    all.extend(proof.at_corners("torque", |corner| motion.torque(unknowns, corner)));
+    let radius = claim.radius_rad.value();
     let start = BigRational::one() - radius * radius * claim.goal_step_weight()?;
     all.push(Inequality::decide("start".to_owned(), &vec![vec![start]]));
     Ok(all)
+}
+
+/// A claim's numbers, checked to be such as the proof allows.
+struct Proof {
+    motion: SampledLoop<BigRational>,
+    unknowns: SampledUnknowns<BigRational>,
+    corners: Vec<Corner<BigRational>>,
+}
+
+impl Proof {
+    fn new(document: &Document, claim: &SampledRegionClaim) -> Result<Self, Flaw> {
+        let SampledRegionClaim { sampling, witness, .. } = claim;
+        let motion = sampled_loop(document, sampling, &witness.rho, &witness.speed)?;
+        let unknowns = unknowns(witness, sampling.delay_samples)?;
+        if !motion.has_relative_bound() && !unknowns.theta.is_one() {
+            return Err(Flaw::Missing { constant: "k_r" });
+        }
+        Ok(Self { motion, unknowns, corners: corners(document, witness)? })
+    }
+
+    fn at_corners(
+        &self,
+        what: &str,
+        form: impl Fn(&Corner<BigRational>) -> Option<Form<BigRational>>,
+    ) -> Vec<Inequality> {
+        let name = |index: usize| format!("{what} at corner {} of the inertia interval", index + 1);
+        let decided = |(index, corner)| form(corner).map(|form| Inequality::decide(name(index), &form.0));
+        self.corners.iter().enumerate().filter_map(decided).collect()
+    }
 }
 
 /// The loop as the proof sees it, for given bounds `rho` and `speed`.

@@ -1,0 +1,80 @@
+//! Bounds become a record; the record holds, an edited one does not.
+#![expect(clippy::unwrap_used, reason = "helpers of tests")]
+
+use certune_bounds::riccati::riccati_bounds;
+use certune_bounds::rigorous::{AngleSet, Effort, PolygonPlan, polygon_bounds_with};
+use certune_bounds::{ArmBox, Ranges, RecordError, recheck, record};
+use certune_dynamics::{Model, Robot};
+use certune_verify::{Number, Record};
+
+fn silent(_: f64) {}
+
+/// The Panda's first two links: small enough to prove everything in a moment.
+fn short_arm() -> Robot {
+    let panda = Robot::panda();
+    Robot::new("short", panda.gravity_m_per_s2(), panda.links()[..2].to_vec()).unwrap()
+}
+
+fn proved(robot: &Robot) -> Record {
+    let ranges = Ranges { mass_uncertainty: 0.1, rotor_inertia_kg_m2: [0.1, 0.2], ..Ranges::nominal() };
+    let arms = ArmBox::<2>::new(&Model::new(robot).unwrap(), &ranges).unwrap();
+    let set = AngleSet::Box { lower_rad: [-1.0, -1.7], upper_rad: [1.0, 1.7] };
+    let plan = PolygonPlan::new(&arms, &set, Effort::Quick).unwrap();
+    let polygons = polygon_bounds_with(&arms, &set, &plan, &silent).unwrap();
+    let riccati = riccati_bounds(&arms, &set, Effort::Quick, &silent).unwrap();
+    let record = record(robot, &ranges, &set, &polygons, &riccati).unwrap();
+    // Five digits, outward.
+    let m_hi = record.bounds.m_hi_kg_m2.to_f64();
+    assert!(m_hi >= polygons.m_hi_kg_m2 && m_hi <= polygons.m_hi_kg_m2 * (1.0 + 2e-4));
+    let m_lo = record.bounds.m_lo_kg_m2.to_f64();
+    assert!(m_lo <= riccati.m_lo_kg_m2 && m_lo >= riccati.m_lo_kg_m2 * (1.0 - 2e-4));
+    assert!(record.bounds.m_hi_kg_m2.to_string().chars().filter(char::is_ascii_digit).count() <= 6);
+    record
+}
+
+#[test]
+fn a_record_survives_its_file_and_its_proofs() {
+    let robot = short_arm();
+    let record = proved(&robot);
+    let text = serde_json::to_string(&record).unwrap();
+    let read = Record::parse(&text).unwrap().unwrap();
+    assert_eq!(read, record);
+    recheck::<2>(&read, &robot, &silent).unwrap();
+}
+
+#[test]
+fn a_record_that_claims_more_than_its_proofs_is_refused() {
+    let robot = short_arm();
+    let record = proved(&robot);
+    let edited = |edit: &dyn Fn(&mut Record)| {
+        let mut edited = record.clone();
+        edit(&mut edited);
+        recheck::<2>(&edited.sealed(), &robot, &silent).unwrap_err()
+    };
+    let scaled = |number: &Number, factor: f64| Number::decimal(number.to_f64() * factor).unwrap();
+    type Edit = (&'static str, fn(&mut Record) -> &mut Number, f64);
+    let edits: [Edit; 8] = [
+        ("m_lo_kg_m2", |r| &mut r.bounds.m_lo_kg_m2, 1.001),
+        ("m_hi_kg_m2", |r| &mut r.bounds.m_hi_kg_m2, 0.999),
+        ("k_g_n_m_per_rad", |r| &mut r.bounds.k_g_n_m_per_rad, 0.999),
+        ("k_c_kg_m2", |r| &mut r.bounds.k_c_kg_m2, 0.999),
+        ("k_r", |r| r.bounds.k_r.as_mut().unwrap(), 0.999),
+        ("k_m", |r| r.bounds.k_m.as_mut().unwrap(), 0.999),
+        ("diagonal_kg_m2", |r| &mut r.bounds.diagonal_kg_m2.as_mut().unwrap()[1][1], 0.999),
+        ("gravity_torque_n_m", |r| &mut r.bounds.gravity_torque_n_m.as_mut().unwrap()[1], 0.999),
+    ];
+    for (name, field, factor) in edits {
+        let error = edited(&|r| {
+            let number = field(r);
+            *number = scaled(number, factor);
+        });
+        assert!(matches!(&error, RecordError::Tighter { bound, .. } if *bound == name), "{name}: {error}");
+    }
+    // Other masses, another arm, another set, no proof.
+    assert!(matches!(
+        edited(&|r| r.arms.mass_uncertainty = Number::decimal(0.3).unwrap()),
+        RecordError::Tighter { .. } | RecordError::Bounds(_)
+    ));
+    assert!(matches!(edited(&|r| r.proofs.clear()), RecordError::Parameter { .. }));
+    assert!(matches!(edited(&|r| r.arm.sha256 = "0".repeat(64)), RecordError::OtherArm { .. }));
+}
