@@ -212,6 +212,42 @@ fn lists_name_what_is_built_in() {
     }
 }
 
+/// Two links in a plane.
+const TWO_LINKS: &str = r#"<robot name="two-links"><link name="base"/>
+<link name="upper"><inertial><mass value="2"/><origin xyz="0.15 0 0"/>
+<inertia ixx="0.002" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+<link name="lower"><inertial><mass value="1"/><origin xyz="0.1 0 0"/>
+<inertia ixx="0.001" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin rpy="1.5707963 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="60" velocity="2"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="30" velocity="2"/></joint></robot>"#;
+
+/// A record of one's own: claims that rest on it are proved, verify asks for it, and derives it again.
+#[test]
+fn constants_of_ones_own_arm_make_claims_proved() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("two.urdf"), TWO_LINKS).unwrap();
+    let made = json(folder.path(), "constants --robot two.urdf --effort quick --out two.json", 0);
+    assert_eq!(made["record"]["over"]["kind"], "all-angles");
+    let claims = "--gravity-compensation on --friction 1..3 --claim exponential,region --out c.json";
+    let certify = format!("certify --robot two.urdf --gains pezzato2020-simulation {claims}");
+    assert_eq!(json(folder.path(), &certify, 0)["claims"][1]["grade"], "conditional");
+    let proved = json(folder.path(), &format!("{certify} --constants two.json"), 0);
+    assert_eq!(proved["constants_sha256"], made["record"]["sha256"]);
+    for claim in proved["claims"].as_array().unwrap() {
+        assert_eq!(claim["grade"], "proved");
+    }
+    // A payload that the record does not hold.
+    let heavier = json(folder.path(), &format!("{certify} --constants two.json --payload 1"), 0);
+    assert_eq!(heavier["claims"][0]["grade"], "conditional");
+    json(folder.path(), &format!("{certify} --constants two.json"), 0);
+    stdout(folder.path(), "verify c.json", 2);
+    stdout(folder.path(), "verify c.json --constants two.json", 0);
+    let full = stdout(folder.path(), "verify --full c.json --constants two.json --robot two.urdf", 0);
+    assert!(full.contains("derived again"), "{full}");
+}
+
 /// The recorded result of the main job is still accepted.
 #[test]
 fn the_recorded_certificate_verifies() {
