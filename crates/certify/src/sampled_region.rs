@@ -52,7 +52,7 @@ const STRICTNESS: [f64; 4] = [1e-7, 1e-6, 1e-5, 1e-4];
 const RHO: [f64; 3] = [0.04, 0.12, 0.36];
 const SPEED: [f64; 3] = [0.005, 0.01, 0.02];
 /// Factors by which the pattern search moves, in turn.
-const MOVES: [f64; 2] = [1.4, 1.15];
+const MOVES: [f64; 3] = [1.5, 1.2, 1.08];
 
 /// The claim `sampled-region` with the largest radius found, or "not proved".
 pub fn sampled_region(problem: &Problem, options: &SampledRegionOptions) -> Claim {

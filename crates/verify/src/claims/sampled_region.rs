@@ -153,9 +153,14 @@ impl Provable for SampledRegionClaim {
             Compensation::Continuous => "gravity compensated at every instant",
             Compensation::Held => "gravity compensated at each sample without delay and held until the next",
         };
+        let late = match delay_samples {
+            0 => "applied at once".to_owned(),
+            1 => "1 sample late".to_owned(),
+            k => format!("{k} samples late"),
+        };
         let limit = if self.sampling.torque_limit_n_m.is_some() { "no other torque limit" } else { "no torque limit" };
         format!(
-            "the controller's own step every {step_s} s, its torque held in between and {delay_samples} samples late, the arm in continuous \
+            "the controller's own step every {step_s} s, its torque held in between and {late}, the arm in continuous \
              time, {compensation}, friction constant in time, {limit}, no noise, no Coulomb friction, joint limits not modelled"
         )
     }
