@@ -25,8 +25,9 @@ pub const PRESETS: [(&str, &str); 5] = [
 ];
 
 /// Tasks with their plant boxes.
-pub const SCENARIOS: [(&str, &str); 5] = [
+pub const SCENARIOS: [(&str, &str); 6] = [
     ("pick-and-place", include_str!("../scenarios/pick-and-place.toml")),
+    ("pick-and-place-ramped", include_str!("../scenarios/pick-and-place-ramped.toml")),
     ("pick-and-place-paper", include_str!("../scenarios/pick-and-place-paper.toml")),
     ("hold", include_str!("../scenarios/hold.toml")),
     ("payload-swap", include_str!("../scenarios/payload-swap.toml")),
@@ -211,6 +212,15 @@ pub fn records(files: &[PathBuf]) -> Result<Vec<Record>, Error> {
     let built_in = CONSTANTS.iter().map(|(name, text)| record(Path::new(name), text));
     let given = files.iter().map(|path| record(path, &output::read_file(path)?));
     built_in.chain(given).collect()
+}
+
+/// The built-in robot that a record is about.
+pub fn robot_of(record: &Record) -> Result<Robot, Error> {
+    let built_in = BUILT_IN.iter().filter_map(|name| Robot::built_in(name));
+    built_in
+        .into_iter()
+        .find(|robot| robot.sha256() == record.arm.sha256)
+        .ok_or_else(|| Error::RobotOfRecord { robot: record.arm.name.clone(), sha256: record.arm.sha256.clone() })
 }
 
 fn record(path: &Path, text: &str) -> Result<Record, Error> {

@@ -12,7 +12,7 @@ use certune::verify::ClaimKind;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
-use crate::commands::{certify, inspect, lists, report, simulate, tune, verify};
+use crate::commands::{certify, constants, inspect, lists, report, simulate, tune, verify};
 use crate::error::Error;
 use crate::output;
 use crate::values::{
@@ -23,7 +23,7 @@ use crate::values::{
 const AFTER_HELP: &str = "\
 Examples:
   autotune --robot panda                            tune, certify and report, in under a minute
-  autotune certify --robot panda --gains pezzato2020-simulation
+  autotune certify --robot panda --gains pezzato2020-simulation --gravity-compensation on --friction 1..3
   autotune verify runs/panda-aic-1/certificate.json
   autotune presets                                  what --gains knows by name
 
@@ -61,6 +61,8 @@ pub enum Command {
     Certify(CertifyArgs),
     /// Check certificates again, in exact arithmetic, from the files alone
     Verify(VerifyArgs),
+    /// Prove the constants of an arm that claims rest on, and store them as a record
+    Constants(ConstantsArgs),
     /// Run a scenario and print its figures
     Simulate(SimulateArgs),
     /// Print the arm's dynamics at one state
@@ -155,7 +157,7 @@ pub struct CertifyArgs {
     /// Claims to examine, by name, separated by commas [default: all that apply to the controller]
     #[arg(long = "claim", value_name = "NAME", value_parser = claim, value_delimiter = ',')]
     pub claims: Vec<ClaimKind>,
-    /// Samples from a command to its torque, for the claims about the sampled loop [default: 0]
+    /// Samples from a command to its torque, for the claims about the sampled loop, and for moving-goal when it is named [default: 0]
     #[arg(long, value_name = "K", value_parser = delay, allow_hyphen_values = true)]
     pub delay: Option<usize>,
     /// Respect torque limits: the arm's own less gravity's share, or, with a number, this 2-norm of the controller's torque
@@ -204,6 +206,50 @@ pub struct VerifyArgs {
     /// A record of proved constants that certificates may rest on, besides the built-in ones; may be repeated
     #[arg(long, value_name = "FILE.json")]
     pub constants: Vec<PathBuf>,
+    /// The URDF file of a record that is about no built-in robot
+    #[arg(long, value_name = "FILE.urdf", requires = "full")]
+    pub robot: Option<String>,
+    /// Its last link, if it was named
+    #[arg(long, value_name = "LINK", requires = "robot")]
+    pub tip: Option<String>,
+}
+
+/// How much time goes into tight constants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum EffortName {
+    /// Seconds to a minute
+    Quick,
+    /// Minutes
+    Standard,
+    /// Half an hour and more
+    Thorough,
+}
+
+#[derive(Debug, Args)]
+pub struct ConstantsArgs {
+    #[command(flatten)]
+    pub robot: RobotArgs,
+    /// Configurations that the constants hold for [default: torus]
+    #[arg(long, value_name = "torus|range|scenario", hide_possible_values = true)]
+    pub over: Option<OverName>,
+    /// Scenario of `--over scenario`, by name or TOML file [default: pick-and-place; for a URDF file a generic one]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub scenario: Option<String>,
+    /// Payload from 0 to this mass, kg; a point held at the grasp point [default: 0]
+    #[arg(long, value_name = "KG", value_parser = non_negative, allow_hyphen_values = true)]
+    pub payload: Option<f64>,
+    /// Link masses differ from nominal by up to this share, 0.2 for ±20 % [default: 0]
+    #[arg(long, value_name = "SHARE", value_parser = share, allow_hyphen_values = true)]
+    pub mass_uncertainty: Option<f64>,
+    /// Rotor inertia of every joint, kg m² [default: the robot's own]
+    #[arg(long, value_name = "X|MIN..MAX", value_parser = interval, allow_hyphen_values = true)]
+    pub rotor_inertia: Option<Interval>,
+    /// How much time goes into tightness [default: standard]
+    #[arg(long, value_name = "quick|standard|thorough", hide_possible_values = true)]
+    pub effort: Option<EffortName>,
+    /// Write the record to this file
+    #[arg(long, value_name = "FILE.json")]
+    pub out: PathBuf,
 }
 
 #[derive(Debug, Args)]
@@ -327,6 +373,7 @@ fn dispatch(cli: Cli) -> Result<Exit, Error> {
         (Some(Command::Tune(args)), _) | (None, Some(args)) => tune::run(&args, context),
         (Some(Command::Certify(args)), _) => certify::run(&args, context),
         (Some(Command::Verify(args)), _) => verify::run(&args, context),
+        (Some(Command::Constants(args)), _) => constants::run(&args, context),
         (Some(Command::Simulate(args)), _) => simulate::run(&args, context),
         (Some(Command::Inspect(args)), _) => inspect::run(&args, context),
         (Some(Command::Report(args)), _) => report::run(&args, context),

@@ -97,6 +97,9 @@ pub enum Error {
     /// A readable record that contradicts itself or was edited.
     #[error("{}: the record of proved constants is rejected: {source}", path.display())]
     RecordRejected { path: PathBuf, source: certune::verify::Rejection },
+    /// A record about a robot that is not built in.
+    #[error("the record is about robot `{robot}` ({sha256}), which is not built in")]
+    RobotOfRecord { robot: String, sha256: String },
     /// A folder without a file that every run has.
     #[error("cannot read {}: {source}", path.display())]
     NoRun { path: PathBuf, source: io::Error },
@@ -164,6 +167,7 @@ impl Error {
             Self::NoRun { .. } | Self::RunRecord { .. } | Self::RunInconsistent { .. } => {
                 Some("a folder that `autotune tune` wrote".to_owned())
             }
+            Self::RobotOfRecord { .. } => Some("--robot with its URDF file (and --tip, if it was named)".to_owned()),
             Self::OtherRobot { .. } | Self::RobotOfRun { .. } => {
                 Some("--robot with the URDF file of that run (and --tip, if it was named)".to_owned())
             }

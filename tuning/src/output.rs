@@ -139,6 +139,14 @@ impl Staged {
     }
 }
 
+/// Makes sure that a file can be written, before the work whose result it is to hold; the file itself stays as it is.
+pub fn check_writable(path: &Path) -> Result<(), Error> {
+    if std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+        return Ok(());
+    }
+    Staged::write(path, "").map(drop)
+}
+
 /// Writes one file whole or not at all; into a device or a pipe (`/dev/stdout`) the content is simply written.
 pub fn write_file(path: &Path, content: &str) -> Result<(), Error> {
     if std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {

@@ -9,7 +9,11 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use crate::output;
 
 const SPINNER: &str = "  {spinner} {msg}";
+const SHARE: &str = "  {msg} {bar:32} {percent}%, {eta} left";
 const BAR: &str = "  search {bar:32} {pos}/{len} candidates, {rate}, {eta} left, {msg}";
+
+/// Steps of a bar that is told shares.
+const SHARES: u64 = 1000;
 
 /// One line on a terminal, redrawn; with `verbose`, lines that stay as well.
 pub struct Terminal {
@@ -41,6 +45,21 @@ impl Terminal {
         self.bar.set_message(what.to_owned());
         self.bar.enable_steady_tick(Duration::from_millis(120));
         self.detail(|| format!("[{:5.1} s] {what}", self.began.elapsed().as_secs_f64()));
+    }
+
+    /// Something that tells which share of it is done begins.
+    pub fn begin_share(&self, what: &str) {
+        self.bar.reset();
+        self.bar.disable_steady_tick();
+        self.bar.set_style(style(SHARE));
+        self.bar.set_length(SHARES);
+        self.bar.set_message(what.to_owned());
+        self.detail(|| format!("[{:5.1} s] {what}", self.began.elapsed().as_secs_f64()));
+    }
+
+    /// The share that is done, from any thread.
+    pub fn share(&self, done: f64) {
+        self.bar.set_position((done.clamp(0.0, 1.0) * SHARES as f64) as u64);
     }
 
     /// A line that stays, for those who asked for more.

@@ -403,12 +403,13 @@ fn finite(key: &str, values: &[f64]) -> Result<(), KeyError> {
 mod tests {
     use super::*;
 
-    const FILES: [(&str, &str); 5] = [
+    const FILES: [(&str, &str); 6] = [
         ("pick-and-place", include_str!("../../../tuning/scenarios/pick-and-place.toml")),
         ("pick-and-place-paper", include_str!("../../../tuning/scenarios/pick-and-place-paper.toml")),
         ("hold", include_str!("../../../tuning/scenarios/hold.toml")),
         ("payload-swap", include_str!("../../../tuning/scenarios/payload-swap.toml")),
         ("push", include_str!("../../../tuning/scenarios/push.toml")),
+        ("pick-and-place-ramped", include_str!("../../../tuning/scenarios/pick-and-place-ramped.toml")),
     ];
 
     fn refused(text: &str) -> (String, usize) {

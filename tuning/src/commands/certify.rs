@@ -49,7 +49,7 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
         }
         None => (plant_box(args, &robot), None),
     };
-    let over = over(args, &robot)?;
+    let over = over(args.over, args.scenario.as_deref(), &robot)?;
     let Certified { certificate, growth, unknown_records } = for_joint_count!(robot.joints(), N => {
         certificate::<N>(args, &robot, &gains, &plant_box, (&records, &over), context)
     })
@@ -96,21 +96,23 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
     Ok(exit_of(&certificate))
 }
 
+/// Least and largest value of the robot's own links.
+pub fn own(robot: &Robot, value: fn(&Link) -> f64) -> [f64; 2] {
+    let values = || robot.links().iter().map(value);
+    [values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max)]
+}
+
 /// The plants that the options speak of.
 fn plant_box(args: &CertifyArgs, robot: &Robot) -> PlantBox {
-    let own = |value: fn(&Link) -> f64| {
-        let values = || robot.links().iter().map(value);
-        [values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max)]
-    };
     PlantBox {
         mass_uncertainty: args.mass_uncertainty.unwrap_or(0.0),
         payload_kg: [0.0, args.payload.unwrap_or(0.0)],
         friction_n_m_s_per_rad: args
             .friction
-            .map_or_else(|| own(|link| link.viscous_n_m_s_per_rad), |interval| interval.0),
+            .map_or_else(|| own(robot, |link| link.viscous_n_m_s_per_rad), |interval| interval.0),
         rotor_inertia_kg_m2: args
             .rotor_inertia
-            .map_or_else(|| own(|link| link.rotor_inertia_kg_m2), |interval| interval.0),
+            .map_or_else(|| own(robot, |link| link.rotor_inertia_kg_m2), |interval| interval.0),
         delay_samples: [0; 2],
         gravity_compensation: args.gravity_compensation == Some(Switch::On),
     }
@@ -155,12 +157,12 @@ fn goals(scenario: Scenario) -> GoalListValues {
     GoalListValues { start_rad: scenario.start_rad, goals }
 }
 
-/// The configurations that the options speak of.
-pub fn over(args: &CertifyArgs, robot: &Robot) -> Result<Over, Error> {
-    Ok(match args.over {
+/// The configurations that `--over` speaks of.
+pub fn over(name: Option<OverName>, scenario: Option<&str>, robot: &Robot) -> Result<Over, Error> {
+    Ok(match name {
         None | Some(OverName::Torus) => Over::AllAngles,
         Some(OverName::Range) => Over::JointRange,
-        Some(OverName::Scenario) => around(&catalogue::scenario(args.scenario.as_deref(), robot)?, robot),
+        Some(OverName::Scenario) => around(&catalogue::scenario(scenario, robot)?, robot),
     })
 }
 

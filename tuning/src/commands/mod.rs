@@ -2,6 +2,7 @@
 
 pub mod certify;
 pub mod claims;
+pub mod constants;
 pub mod inspect;
 pub mod lists;
 pub mod report;

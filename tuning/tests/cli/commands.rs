@@ -1,6 +1,7 @@
 //! What each command prints, and its exit code, when nothing is wrong.
 
 use crate::common::{autotune, json, stdout, urdf};
+use certune::verify::{Document, Record};
 use serde_json::Value;
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -210,6 +211,57 @@ fn lists_name_what_is_built_in() {
         assert!(entries.iter().any(|entry| entry["name"] == name));
         assert!(entries.iter().all(|entry| !entry["description"].as_str().unwrap().is_empty()));
     }
+}
+
+/// Two links in a plane.
+const TWO_LINKS: &str = r#"<robot name="two-links"><link name="base"/>
+<link name="upper"><inertial><mass value="2"/><origin xyz="0.15 0 0"/>
+<inertia ixx="0.002" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
+<link name="lower"><inertial><mass value="1"/><origin xyz="0.1 0 0"/>
+<inertia ixx="0.001" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin rpy="1.5707963 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="60" velocity="2"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" effort="30" velocity="2"/></joint></robot>"#;
+
+/// A record that holds what `document` says of its arm, without the proofs that would make it follow.
+fn unproved_record(document: &Document) -> Record {
+    Record {
+        schema: 0,
+        arm: document.arm.clone(),
+        arms: document.family.arms.clone(),
+        over: document.constants.over.clone(),
+        bounds: document.constants.bounds.clone(),
+        proofs: Vec::new(),
+        sha256: String::new(),
+    }
+    .sealed()
+}
+
+/// Claims that rest on a record are called proved, the checker asks for the record, and does not believe it when it is derived again.
+#[test]
+fn claims_rest_on_a_record_that_must_be_at_hand_and_follow_from_its_proofs() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("two.urdf"), TWO_LINKS).unwrap();
+    let claims = "--gravity-compensation on --friction 1..3 --claim exponential,region --out c.json";
+    let certify = format!("certify --robot two.urdf --gains pezzato2020-simulation {claims}");
+    assert_eq!(json(folder.path(), &certify, 0)["claims"][1]["grade"], "conditional");
+    let sampled = std::fs::read_to_string(folder.path().join("c.json")).unwrap();
+    let record = unproved_record(&serde_json::from_str(&sampled).unwrap());
+    std::fs::write(folder.path().join("r.json"), serde_json::to_string(&record).unwrap()).unwrap();
+
+    // A payload that the record does not hold.
+    let heavier = json(folder.path(), &format!("{certify} --constants r.json --payload 1"), 0);
+    assert_eq!(heavier["claims"][0]["grade"], "conditional");
+    let made = json(folder.path(), &format!("{certify} --constants r.json"), 0);
+    assert_eq!(made["constants_sha256"], record.sha256.as_str());
+    assert!(made["claims"].as_array().unwrap().iter().all(|claim| claim["grade"] == "proved"));
+    stdout(folder.path(), "verify c.json", 2);
+    stdout(folder.path(), "verify c.json --constants r.json", 0);
+    let full = json(folder.path(), "verify --full c.json --constants r.json --robot two.urdf", 2);
+    assert_eq!(full["constants"][0]["derived_again"], false);
+    // Not a built-in robot: its file is asked for.
+    stdout(folder.path(), "verify --full c.json --constants r.json", 1);
 }
 
 /// The recorded result of the main job is still accepted.

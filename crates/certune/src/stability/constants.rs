@@ -25,21 +25,26 @@ pub enum Over {
 }
 
 impl Over {
-    /// The set as records and certificates write it; all angles when an end is no decimal or an interval is empty.
-    pub fn written(&self, robot: &Robot) -> ConfigurationSet {
+    /// The ends of the box; `None` for all angles, also when a joint has no end stop or an interval is empty.
+    pub(super) fn angles(&self, robot: &Robot) -> Option<(Vec<f64>, Vec<f64>)> {
         let limits = |value: fn(&certune_dynamics::Link) -> f64| robot.links().iter().map(value).collect::<Vec<_>>();
         let (lower, upper) = match self {
-            Self::AllAngles => return ConfigurationSet::AllAngles,
+            Self::AllAngles => return None,
             Self::JointRange => (limits(|link| link.limits.lower_rad), limits(|link| link.limits.upper_rad)),
             Self::Box { lower_rad, upper_rad } => (lower_rad.clone(), upper_rad.clone()),
         };
+        let finite = lower.iter().chain(&upper).all(|angle| angle.is_finite());
+        (finite && lower.iter().zip(&upper).all(|(lower, upper)| lower < upper)).then_some((lower, upper))
+    }
+
+    /// The set as records and certificates write it.
+    pub fn written(&self, robot: &Robot) -> ConfigurationSet {
         let numbers = |values: &[f64]| values.iter().map(|&value| Number::decimal(value)).collect::<Option<Vec<_>>>();
-        match (numbers(&lower), numbers(&upper)) {
-            (Some(lower_rad), Some(upper_rad)) if lower.iter().zip(&upper).all(|(lower, upper)| lower < upper) => {
-                ConfigurationSet::Box { lower_rad, upper_rad }
-            }
-            _ => ConfigurationSet::AllAngles,
-        }
+        self.angles(robot)
+            .and_then(|(lower, upper)| {
+                Some(ConfigurationSet::Box { lower_rad: numbers(&lower)?, upper_rad: numbers(&upper)? })
+            })
+            .unwrap_or(ConfigurationSet::AllAngles)
     }
 }
 

@@ -9,6 +9,7 @@
 //! | `counterexample`, `growth` | for a refusal: an unstable member of the family, and a simulation that shows it |
 //! | `objective` | a certified figure as the objective of a search |
 //! | `poles` | a map of poles |
+//! | `proving` | the constants of an arm, proved and written as a record |
 
 mod arm;
 mod constants;
@@ -17,9 +18,10 @@ mod gains;
 mod growth;
 mod objective;
 mod poles;
+mod proving;
 mod request;
 
-use certune_bounds::BoundsError;
+use certune_bounds::{BoundsError, RecordError};
 use certune_certify::{CertifyError, FamilyValues, ProblemError, to_json};
 use certune_closed_loop::{PlantBox, PlantError};
 use certune_control::ParamError;
@@ -33,6 +35,7 @@ pub use gains::ArmGains;
 pub use growth::{Growth, growth};
 pub use objective::CertifiedObjective;
 pub use poles::poles_per_s;
+pub use proving::{ProvingEffort, ProvingTask, prove_constants};
 pub use request::{Answer, Effort, Request, TorqueLimits, claims_for};
 
 /// The controllers' own step, s. Continuous-time claims do not depend on it; parameters are validated with it.
@@ -67,6 +70,9 @@ pub enum StabilityError {
     /// The family is no family.
     #[error(transparent)]
     Family(#[from] BoundsError),
+    /// The constants make no record.
+    #[error(transparent)]
+    Record(#[from] RecordError),
     /// A plant of the family cannot be built.
     #[error(transparent)]
     Plant(#[from] PlantError),

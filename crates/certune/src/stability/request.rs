@@ -47,8 +47,8 @@ impl Default for Effort {
 pub struct Request {
     /// The claims, in this order; empty for all that apply to the gains ([`claims_for`]).
     pub claims: Vec<ClaimKind>,
-    /// Samples from a command to its torque, for the claims about the sampled loop; `None` leaves them as the effort has them, and `moving-goal`
-    /// speaks of continuous time.
+    /// Samples from a command to its torque, for the claims about the sampled loop; `None` leaves them as the effort has them. `moving-goal` rests
+    /// on the sampled loop when it is asked for by name and with a delay, on continuous time otherwise.
     pub delay_samples: Option<usize>,
     /// Torque limits, for the claims that can respect some.
     pub torque_limits: TorqueLimits,

@@ -359,3 +359,44 @@ impl MovingGoalClaim {
         Ok(list.goals.len())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use num_traits::ToPrimitive;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// The bound of a leg against the recursion it bounds: full steps from the first sample on, in a norm of two weights.
+        #[test]
+        fn a_leg_bounds_the_recursion_and_little_more(
+            rate in 1_i64..300, speed in 1_i64..200, steps in (-200_i64..200, -200_i64..200), before in 0_i64..100, sampled: bool,
+        ) {
+            prop_assume!(steps != (0, 0));
+            let h = 1e-3;
+            let period = if sampled { Some(ratio(1, 1000)) } else { None };
+            let norm = Norm { shift_weights: vec![ratio(2, 1), ratio(1, 3)], rate: ratio(rate, 100), period, kept: None };
+            let motion = Motion::new(norm).unwrap();
+            let number = |x: i64| Number::decimal(x as f64 / 100.0).unwrap();
+            let lengths = motion.lengths(&[number(0), number(0)], &[number(steps.0), number(steps.1)]);
+            let leg = motion.leg(&ratio(before, 100), &lengths, &ratio(speed, 100));
+            let [weighted, plain] = lengths.map(|x| x.to_f64().unwrap().sqrt());
+            let (rate, speed) = (rate as f64 / 100.0, speed as f64 / 100.0);
+            let samples = (plain / (speed * h)).floor() as usize;
+            prop_assume!(samples > 20);
+            let kept = if sampled { 1.0 - rate * h } else { (-rate * h).exp() };
+            // In continuous time a sample's way adds at most its length, and at least that much decayed over the sample.
+            let added = speed * h * weighted / plain * if sampled { 1.0 } else { kept };
+            let (mut norm, mut peak) = (before as f64 / 100.0, before as f64 / 100.0);
+            for _ in 0..samples {
+                norm = kept * norm + added;
+                peak = peak.max(norm);
+            }
+            let [arrival_bound, peak_bound] = [&leg.arrival, &leg.peak].map(|x| x.to_f64().unwrap());
+            prop_assert!(peak <= peak_bound * (1.0 + 1e-9), "{peak} {peak_bound}");
+            // The way left of the last, cut step changes the norm by a few steps at most.
+            prop_assert!(norm <= arrival_bound + 2.0 * rate * h * norm.max(1.0), "{norm} {arrival_bound}");
+            prop_assert!(arrival_bound <= norm + 0.02 * norm.max(1.0) + 3.0 * added, "{arrival_bound} {norm}");
+        }
+    }
+}
