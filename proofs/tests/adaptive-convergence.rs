@@ -69,8 +69,7 @@ fn the_stored_certificate_is_the_one_derived() {
     assert_eq!(released.checked()[0].statement, derived.certificate.checked()[0].statement);
     assert!(released.checked()[0].statement.contains("lack the step"));
     let robot = MracGains { law: MracLaw::RawGoal, ..published_mrac("robot").unwrap() };
-    let derived =
-        asked_mrac(robot, &nominal_family(true, [0.0, 0.0]), ClaimKind::AdaptiveConvergence, B, 0).unwrap();
+    let derived = asked_mrac(robot, &nominal_family(true, [0.0, 0.0]), ClaimKind::AdaptiveConvergence, B, 0).unwrap();
     let refused = stored_with_records("adaptive-convergence--robot", &derived).unwrap();
     assert!(matches!(refused.document().claims[0].claim, Claim::AdaptiveRefused(_)));
 }

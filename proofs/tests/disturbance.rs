@@ -1,10 +1,10 @@
 //! `claims/disturbance.md` on the Panda: the published simulation gains, gravity compensated, friction 1 to 3 N m s/rad.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "test helpers")]
 
+use certune::Effort;
 use certune::certify::{DisturbanceOptions, Options, to_json};
 use certune::control::aic::AicGains;
 use certune::verify::{Certificate, Claim, ClaimKind, DisturbanceClaim, Number, seal, verify};
-use certune::Effort;
 use proofs::{nominal_family, panda, records, stored};
 
 const QUIET: DisturbanceOptions = DisturbanceOptions {

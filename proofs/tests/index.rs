@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use proofs::index::{INDEX, table};
+use proofs::kept;
 
 const BEFORE: &str = "<!-- certificates, written by `cargo xtask claims` -->\n";
 const AFTER: &str = "<!-- end of certificates -->\n";
@@ -36,4 +37,22 @@ fn every_certificate_is_listed_once() {
     listed.sort();
     assert_eq!(files, listed);
     assert!(INDEX.len() >= 10);
+}
+
+/// `[0.74 /s](certificates/exponential.json)`: the number is a figure of that certificate, cut off after a few digits.
+#[test]
+fn the_numbers_of_the_text_are_those_of_the_certificates() {
+    let page = std::fs::read_to_string(at("README.md")).unwrap();
+    let mut found = 0;
+    for (before, link) in page.match_indices("](certificates/").map(|(place, _)| page.split_at(place)) {
+        let words = before.rsplit('[').next().unwrap();
+        let Some(stated) = words.split(' ').next().and_then(|word| word.parse::<f64>().ok()) else { continue };
+        let name = link["](certificates/".len()..].split(".json").next().unwrap();
+        let certificate = kept(name).unwrap();
+        let figures = certificate.document().claims.iter().flat_map(|entry| entry.claim.figures());
+        let close = |value: f64| stated <= value && value - stated <= 0.01 * value;
+        assert!(figures.into_iter().any(|figure| close(figure.value.to_f64())), "[{words}] is no figure of {name}");
+        found += 1;
+    }
+    assert!(found >= 8, "{found}");
 }

@@ -55,7 +55,10 @@ fn normal_dependencies(manifest: &str) -> impl Iterator<Item = &str> {
         .filter(|name| !name.is_empty() && !name.starts_with('#'))
 }
 
-/// Every claim has a statement, a test and a stored certificate.
+/// Tests of `proofs/README.md`, which are about no single claim.
+const PAGE_TESTS: [&str; 2] = ["answer", "index"];
+
+/// Every claim has a statement, a test and a stored certificate; every certificate belongs to a claim, and the page names them all.
 fn complete_claims(root: &Path) -> Result<(), String> {
     let proofs = root.join("proofs");
     let stems = |folder: &str, extension: &str| -> Result<Vec<String>, String> {
@@ -70,16 +73,31 @@ fn complete_claims(root: &Path) -> Result<(), String> {
         names.sort();
         Ok(names)
     };
-    let claims = stems("claims", "md")?;
+    let page = proofs.join("README.md");
+    let page = fs::read_to_string(&page).map_err(|e| format!("{}: {e}", page.display()))?;
+    claims_match(&stems("claims", "md")?, stems("tests", "rs")?, &stems("certificates", "json")?, &page)
+}
+
+/// The rule itself: `<claim>--<variant>` is a further certificate of a claim.
+fn claims_match(claims: &[String], mut tests: Vec<String>, certificates: &[String], page: &str) -> Result<(), String> {
     if claims.is_empty() {
         return Err("proofs/claims holds no claim".to_owned());
     }
-    for (folder, extension) in [("tests", "rs"), ("certificates", "json")] {
-        let found = stems(folder, extension)?;
-        if found != claims {
-            return Err(format!(
-                "proofs/{folder} holds {found:?}, proofs/claims holds {claims:?}: one of each is owed"
-            ));
+    tests.retain(|name| !PAGE_TESTS.contains(&name.as_str()));
+    if tests != claims {
+        return Err(format!("proofs/tests holds {tests:?}, proofs/claims holds {claims:?}: one of each is owed"));
+    }
+    let own: Vec<&String> = certificates.iter().filter(|name| !name.contains("--")).collect();
+    if own != claims.iter().collect::<Vec<_>>() {
+        return Err(format!("proofs/certificates holds {own:?}, proofs/claims holds {claims:?}: one of each is owed"));
+    }
+    for name in certificates {
+        let stem = name.split("--").next().unwrap_or_default();
+        if !claims.iter().any(|claim| claim == stem) {
+            return Err(format!("proofs/certificates/{name}.json belongs to no claim"));
+        }
+        if !page.contains(&format!("(certificates/{name}.json)")) {
+            return Err(format!("proofs/README.md does not link certificates/{name}.json"));
         }
     }
     Ok(())
@@ -93,5 +111,21 @@ mod tests {
     fn only_the_normal_dependencies_count() {
         let manifest = "[package]\nname = \"x\"\n[dependencies]\n# why\nserde.workspace = true\nrand = \"0.9\"\n\n[dev-dependencies]\nproptest = \"1\"\n";
         assert_eq!(normal_dependencies(manifest).collect::<Vec<_>>(), ["serde", "rand"]);
+    }
+
+    #[test]
+    fn a_claim_without_its_files_is_noticed() {
+        let list = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let page = "(certificates/a.json) (certificates/a--more.json) (certificates/b.json)";
+        let check = |claims: &[&str], tests: &[&str], certificates: &[&str]| {
+            claims_match(&list(claims), list(tests), &list(certificates), page)
+        };
+        assert!(check(&["a", "b"], &["a", "answer", "b"], &["a", "a--more", "b"]).is_ok());
+        assert!(check(&["a", "b"], &["a", "b", "other"], &["a", "b"]).is_err());
+        assert!(check(&["a", "b"], &["a"], &["a", "b"]).is_err());
+        assert!(check(&["a", "b"], &["a", "b"], &["a", "a--more"]).is_err());
+        assert!(check(&["a", "b"], &["a", "b"], &["a", "b", "c--more"]).is_err());
+        assert!(check(&["a", "b"], &["a", "b"], &["a", "a--unlisted", "b"]).is_err());
+        assert!(check(&[], &[], &[]).is_err());
     }
 }

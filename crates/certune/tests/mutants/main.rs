@@ -97,6 +97,84 @@ fn the_originals_withstand_attack_themselves() {
     }
 }
 
+/// The attacks are worth something: each kind of statement, made false, is contradicted.
+#[test]
+fn false_statements_do_not_withstand_attack() {
+    let number = |text: &str| -> Number { text.parse().unwrap() };
+    type Lie<'a> = (&'a str, usize, &'a dyn Fn(&mut Claim));
+    let lies: [Lie<'_>; 12] = [
+        ("exponential", 0, &|c| {
+            if let Claim::Exponential(c) = c {
+                c.rate_per_s = number("0.9")
+            }
+        }),
+        ("sampled", 0, &|c| {
+            if let Claim::Sampled(c) = c {
+                c.rate_per_s = number("1.2")
+            }
+        }),
+        ("sampled", 0, &|c| {
+            if let Claim::Sampled(c) = c {
+                c.delay_margin_s = number("0.003")
+            }
+        }),
+        ("region", 0, &|c| {
+            if let Claim::Region(c) = c {
+                c.radius_rad = number("1.3")
+            }
+        }),
+        ("joint-region", 0, &|c| {
+            if let Claim::JointRegion(c) = c {
+                c.radii_rad[0] = number("0.6")
+            }
+        }),
+        ("sampled-region", 0, &|c| {
+            if let Claim::SampledRegion(c) = c {
+                c.radius_rad = number("1.4")
+            }
+        }),
+        ("moving-goal", 1, &|c| {
+            if let Claim::MovingGoal(c) = c {
+                c.goal_speed_rad_per_s = number("1")
+            }
+        }),
+        ("disturbance", 0, &|c| {
+            if let Claim::Disturbance(c) = c {
+                c.excursion_rad = number("0.29")
+            }
+        }),
+        ("lyapunov", 0, &|c| {
+            if let Claim::Lyapunov(c) = c {
+                c.regions = vec![certune::verify::PlaneRegion::HalfPlane { rate_per_s: number("0.5") }];
+            }
+        }),
+        ("adaptive-convergence", 0, &|c| {
+            if let Claim::AdaptiveConvergence(c) = c {
+                c.start_radius_rad = number("0.1")
+            }
+        }),
+        ("pi-exponential", 0, &|c| {
+            if let Claim::PiExponential(c) = c {
+                c.accumulated_k0_n_m_per_rad = number("60")
+            }
+        }),
+        ("exponential--libfranka-uncompensated", 0, &|c| {
+            if let Claim::Refused(c) = c {
+                c.point.stiffness_n_m_per_rad = number("5");
+            }
+        }),
+    ];
+    for (name, entry, lie) in lies {
+        let mut document: Document = serde_json::from_str(original(name)).unwrap();
+        let claim = &mut document.claims[entry].claim;
+        let before = claim.clone();
+        lie(claim);
+        assert_ne!(*claim, before, "{name} was not changed");
+        let caught = std::panic::catch_unwind(|| attack(&document, name));
+        assert!(caught.is_err(), "the attack does not see that {name} is false");
+    }
+}
+
 #[test]
 fn an_edit_without_rehashing_is_always_rejected() {
     let tried: usize = originals()
@@ -136,7 +214,10 @@ fn with_the_hash_recomputed_no_mutant_proves_a_false_statement() {
         })
         .sum();
     let tried = 2 * edits.len();
-    println!("{tried} re-hashed or re-sealed mutants: {} rejected, {survived} survived and withstood attack", tried - survived);
+    println!(
+        "{tried} re-hashed or re-sealed mutants: {} rejected, {survived} survived and withstood attack",
+        tried - survived
+    );
     assert!(tried >= 1000 && survived > 0, "an attack without survivors attacks nothing");
 }
 
@@ -192,7 +273,9 @@ fn hostile_numbers_are_refused_everywhere() {
             let original: Value = serde_json::from_str(text).unwrap();
             let mut tried = 0;
             // Witnesses and the matrices of a polytope are dyadic numbers that nobody reads.
-            let read = fields(&original).into_iter().filter(|(field, _)| !field.contains("witness") && !field.contains("polytope"));
+            let read = fields(&original)
+                .into_iter()
+                .filter(|(field, _)| !field.contains("witness") && !field.contains("polytope"));
             for path in read.flat_map(|(_, paths)| [paths[0].clone(), paths[paths.len() - 1].clone()]) {
                 for number in hostile {
                     let mut mutant = original.clone();
@@ -306,7 +389,11 @@ fn constants_that_are_called_proved_are_the_records() {
             match stands(&edited) {
                 Ok(certificate) => {
                     let claims_proof = matches!(edited.constants.evidence, Evidence::Proved { .. });
-                    assert!(!claims_proof || no_tighter(&edited.constants.bounds, &record.bounds), "{name}: {}", mutant.edit);
+                    assert!(
+                        !claims_proof || no_tighter(&edited.constants.bounds, &record.bounds),
+                        "{name}: {}",
+                        mutant.edit
+                    );
                     attack(certificate.document(), &mutant.edit);
                     wider += 1;
                 }

@@ -154,7 +154,9 @@ pub fn joint_region(document: &Document, claim: &JointRegionClaim, edit: &str, u
             }
         }
     }
-    for (step, share) in claim.steps.iter().flat_map(|s| s.steps_rad.iter().map(|step| (step, s.covered_share.to_f64()))) {
+    for (step, share) in
+        claim.steps.iter().flat_map(|s| s.steps_rad.iter().map(|step| (step, s.covered_share.to_f64())))
+    {
         let length: f64 =
             step.iter().zip(&claim.radii_rad).map(|(e, r)| (share * e.to_f64() / r.to_f64()).powi(2)).sum();
         assert!(length <= 1.0 + SLACK, "{edit}: a step of length {length} in an ellipsoid of 1");
@@ -206,7 +208,8 @@ pub fn sampled_region(document: &Document, claim: &SampledRegionClaim, edit: &st
                 assert!(x[5].abs() <= limit.to_f64(), "{edit}: torque {}", x[5]);
             }
         }
-        let radius = joint.period(at, h, delay, motion).complex_eigenvalues().iter().map(|z| z.norm()).fold(0.0, f64::max);
+        let radius =
+            joint.period(at, h, delay, motion).complex_eigenvalues().iter().map(|z| z.norm()).fold(0.0, f64::max);
         assert!(radius <= decay.sqrt() + 1e-9, "{edit}: radius {radius} at {at:?}");
     }
 }
@@ -320,7 +323,8 @@ pub fn disturbance(document: &Document, claim: &DisturbanceClaim, edit: &str, un
     let joint = Joint::of(document, 0);
     let w = &claim.witness;
     let most = [&claim.position_noise_rad, &claim.velocity_noise_rad_per_s, &claim.torque_n_m].map(Number::to_f64);
-    let [excursion, ultimate, rate] = [&claim.excursion_rad, &claim.ultimate_rad, &claim.rate_per_s].map(Number::to_f64);
+    let [excursion, ultimate, rate] =
+        [&claim.excursion_rad, &claim.ultimate_rad, &claim.rate_per_s].map(Number::to_f64);
     for _ in 0..4 {
         let at = point(&family_box(document), uniform);
         let v = energy(w.p.to_f64(), &w.b, &floats(&w.s), [at[0], at[2]]);
