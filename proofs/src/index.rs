@@ -76,7 +76,8 @@ fn in_words(claim: &Claim) -> String {
             );
             if let Some(attained) = &refused.attained {
                 let [real, imaginary] = &attained.eigenvalue_per_s;
-                let _ = write!(text, ": eigenvalue {real} ± {imaginary}i /s at q = [{}]", numbers(&attained.q_rad));
+                let size = imaginary.to_string().replace('-', "");
+                let _ = write!(text, ": eigenvalue {real} ± {size}i /s at q = [{}]", numbers(&attained.q_rad));
             }
             for remedy in &refused.remedies {
                 let name = match remedy.of {
