@@ -1,12 +1,12 @@
 //! One attack for each kind of claim.
 
-use certune::closed_loop::linearise_aic;
+use certune::closed_loop::{linearise_aic, linearise_aic_sampled};
 use certune::control::aic::{AicGains, AicParams};
 use certune::dynamics::{Model, Payload, gravity_torque};
 use certune::linsys::Joints;
 use certune::verify::{
     Certificate, Claim, ExponentialClaim, JointRegionClaim, MovingGoalClaim, Number, RefusedClaim, RegionClaim,
-    SampledRegionClaim,
+    SampledClaim, SampledRegionClaim,
 };
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::RngCore;
@@ -26,6 +26,7 @@ const V_SLACK: f64 = 1e-6;
 pub struct Tally {
     pub rates: usize,
     pub regions: usize,
+    pub sampled: usize,
     pub joint_regions: usize,
     pub sampled_regions: usize,
     pub moving_goals: usize,
@@ -39,6 +40,7 @@ impl std::ops::AddAssign for Tally {
     fn add_assign(&mut self, other: Self) {
         self.rates += other.rates;
         self.regions += other.regions;
+        self.sampled += other.sampled;
         self.joint_regions += other.joint_regions;
         self.sampled_regions += other.sampled_regions;
         self.moving_goals += other.moving_goals;
@@ -61,6 +63,7 @@ pub fn attack<const N: usize>(
         match &entry.claim {
             Claim::Exponential(claim) => exponential(subject, claim, &params, rng, &mut tally),
             Claim::Region(claim) => region(subject, claim, &params, rng, &mut tally),
+            Claim::Sampled(claim) => sampled(subject, claim, &params, rng, &mut tally),
             Claim::JointRegion(claim) => joint_region(subject, claim, &params, rng, &mut tally),
             Claim::SampledRegion(claim) => sampled_region(subject, claim, &params, rng, &mut tally),
             Claim::MovingGoal(claim) => {
@@ -203,6 +206,31 @@ fn search<const N: usize>(closed: &Loop<'_, N>, claim: &RegionClaim, rng: &mut C
         }
     }
     STATES
+}
+
+/// Eigenvalues of sampled loops of random members, at every whole delay up to the claim's and up to its margin.
+fn sampled<const N: usize>(
+    subject: &Subject<N>,
+    claim: &SampledClaim,
+    params: &AicParams<N>,
+    rng: &mut ChaCha8Rng,
+    tally: &mut Tally,
+) {
+    tally.sampled += 1;
+    let period = claim.sampling.period_s.to_f64();
+    let samples = |delay: &Number| (delay.to_f64() / period + 1e-9).floor() as usize;
+    let compensated = subject.plant_box.gravity_compensation;
+    for _ in 0..3 {
+        let (model, q) = (member(subject, rng), angles(rng));
+        for delay in 0..=samples(&claim.delay_margin_s).min(8) {
+            let closed = linearise_aic_sampled(&model, &q, params, compensated, delay).unwrap();
+            let outermost = closed.eigenvalues().into_iter().map(|z| z.norm()).fold(0.0, f64::max);
+            let certified = delay <= samples(&claim.sampling.delay_s);
+            let most = if certified { 1.0 - claim.rate_per_s.to_f64() * period } else { 1.0 };
+            assert!(outermost < most + 1e-9, "{}, {params:?}: {outermost} at delay {delay}", subject.name);
+            tally.attacks += 1;
+        }
+    }
 }
 
 /// From rest on the ellipsoid V must fall, every motor keep to its limit and every joint to its distance.

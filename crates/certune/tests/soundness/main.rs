@@ -6,6 +6,8 @@
 //!   nonlinear continuous-time loop is integrated (Runge-Kutta 4), and the certificate's own V must start at most at 1 and fall as claimed.
 //! - Every certified region is attacked in space: a local search climbs towards a state where V falls too slowly.
 //! - A certified goal speed is attacked by goals that flee, a certified bound on the error by noise that knows V.
+//! - Every claim about the sampled loop is compared with eigenvalues at every whole delay it covers; a sampled region with the controller's own code,
+//!   its torque held and late, and a finely integrated arm.
 //! - Every refusal must name a point where the loop is unstable, an attainable one with an unstable arm.
 //!
 //! `CERTUNE_HUNT_SECONDS=3600` hunts for an hour; without it the hunt is a fixed number of rounds.
@@ -22,10 +24,12 @@ mod subjects;
 
 use std::time::{Duration, Instant};
 
+use certune::Request;
 use certune::verify::ClaimKind;
 use rayon::prelude::*;
 
 use attacks::{Tally, attack};
+use chance::pick;
 use subjects::{Subject, effort};
 
 const SEED: u64 = 0xCE27;
@@ -40,8 +44,16 @@ fn question<const N: usize>(subject: &Subject<N>, stream: u64) -> Tally {
         .map(|set| {
             let mut rng = chance::stream(SEED ^ 0x5EED, stream * GAIN_SETS + set);
             let gains = chance::gains::<N>(&mut rng);
-            let claims = [ClaimKind::Exponential, ClaimKind::Region];
-            let certificate = subject.certifier.certify_with(&gains, &claims, &effort()).unwrap();
+            let claims: &[ClaimKind] = match set % 12 {
+                1 | 2 => &[ClaimKind::JointRegion],
+                3 => &[ClaimKind::SampledRegion],
+                4 => &[ClaimKind::MovingGoal],
+                5 | 6 => &[ClaimKind::Sampled],
+                _ => &[ClaimKind::Exponential, ClaimKind::Region],
+            };
+            let delay_samples = pick(&mut rng, &[0, 1, 2]);
+            let request = Request { claims: claims.to_vec(), effort: effort(delay_samples), ..Request::default() };
+            let certificate = subject.certifier.answer(&gains.into(), &request).unwrap().certificate;
             attack(subject, &certificate, &gains, &mut rng)
         })
         .collect();
