@@ -21,7 +21,7 @@ pub const INDEX: [(&str, &str); 21] = [
     ("region--uncompensated", "simulation gains, gravity not compensated, friction 1 to 3"),
     ("joint-region", "robot gains (re-tuned joint by joint), gravity compensated, friction 1 to 3, motor limits"),
     ("sampled-region", "simulation gains at 1 kHz, one sample of delay, rotor inertia 0.1, friction 1"),
-    ("moving-goal", "simulation gains but `kappa_a` 2000, friction 1 to 3; the pick-and-place task"),
+    ("moving-goal", "simulation gains, gravity compensated, friction 1 to 3; the ramped pick-and-place task"),
     ("disturbance", "simulation gains, gravity compensated, friction 1 to 3, noise of the encoders"),
     ("lyapunov", "robot gains, linearised at goal B, all 42 states"),
     ("adaptive-convergence", "MRAC, simulation gains with the paper's equations, around goal B"),
