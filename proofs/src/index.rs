@@ -23,7 +23,7 @@ pub const INDEX: [(&str, &str); 21] = [
     ("sampled-region", "simulation gains at 1 kHz, one sample of delay, rotor inertia 0.1, friction 1"),
     ("moving-goal", "simulation gains, gravity compensated, friction 1 to 3; the ramped pick-and-place task"),
     ("disturbance", "simulation gains, gravity compensated, friction 1 to 3, noise of the encoders"),
-    ("lyapunov", "robot gains, linearised at goal B, all 42 states"),
+    ("lyapunov", "robot gains, all 42 states: the matrix linearised at goal B, computed in floating point"),
     ("adaptive-convergence", "MRAC, simulation gains with the paper's equations, around goal B"),
     ("adaptive-convergence--robot", "MRAC, robot gains with the paper's equations, around goal B"),
     ("adaptive-convergence--released-code", "MRAC, simulation gains with the law of the released code, around goal B"),
