@@ -1,5 +1,5 @@
 //! `claims/adaptive-sampled.md` on the Panda: the velocity loop of the published MRAC gains at 1 kHz, with and without rotor inertia.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
+#![expect(clippy::unwrap_used, reason = "test helpers")]
 
 use certune::certify::FamilyValues;
 use certune::control::mrac::{MracGains, MracLaw};

@@ -1,5 +1,4 @@
 //! `README.md`'s list of certificates is the one read from them.
-#![expect(clippy::unwrap_used, reason = "test helpers")]
 
 use std::path::{Path, PathBuf};
 

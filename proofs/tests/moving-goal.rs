@@ -1,5 +1,5 @@
-//! `claims/moving-goal.md` on the Panda: how fast the goal may move with the published simulation gains, and with a larger `kappa_a`
-//! along the pick-and-place task.
+//! `claims/moving-goal.md` on the Panda: how fast the goal may move with the published simulation gains, and along the pick-and-place task at
+//! that speed.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "test helpers")]
 
 use certune::certify::{GoalListValues, MovingGoalOptions, Options};
@@ -10,8 +10,8 @@ use certune::{Effort, certificate_text};
 use proofs::{grade, nominal_family, panda, records, stored};
 
 fn pick_and_place() -> GoalListValues {
-    let text = include_str!("../../tuning/scenarios/pick-and-place.toml");
-    let scenario = Scenario::parse("pick-and-place.toml".as_ref(), text).unwrap();
+    let text = include_str!("../../tuning/scenarios/pick-and-place-ramped.toml");
+    let scenario = Scenario::parse("pick-and-place-ramped.toml".as_ref(), text).unwrap();
     let goals = scenario.segments.into_iter().map(|goal| (goal.goal_rad, goal.duration_s)).collect();
     GoalListValues { start_rad: scenario.start_rad, goals }
 }
@@ -42,14 +42,14 @@ fn claim(document: &Document) -> &MovingGoalClaim {
 }
 
 #[test]
-fn a_larger_kappa_a_covers_the_ramped_task_in_its_time() {
-    let derived = derive(2000.0);
+fn the_published_gains_cover_the_ramped_task_in_its_time() {
+    let derived = derive(700.0);
     let stored = stored("moving-goal", &derived).unwrap();
     for certificate in [&derived, &stored] {
         assert!(certificate.all_hold());
         assert_eq!(certificate.checked()[1].grade, Some(grade(certificate)));
         let claim = claim(certificate.document());
-        assert!(claim.goal_speed_rad_per_s.to_f64() >= 0.33, "{}", claim.goal_speed_rad_per_s);
+        assert!(claim.goal_speed_rad_per_s.to_f64() >= 0.2, "{}", claim.goal_speed_rad_per_s);
         let list = claim.list.as_ref().unwrap();
         assert!(list.goals.iter().all(|goal| goal.arrival_s.value() <= goal.duration_s.value()));
         // Speed, jumps, five goals that arrive, and the distance at both ends of the inertia.
@@ -65,17 +65,16 @@ fn a_larger_kappa_a_covers_the_ramped_task_in_its_time() {
 }
 
 #[test]
-fn the_published_gains_allow_a_slower_goal() {
-    let certificate = derive(700.0);
+fn a_larger_kappa_a_allows_a_faster_goal() {
+    let certificate = derive(2000.0);
     assert!(certificate.all_hold());
     let claim = claim(certificate.document());
-    assert!((0.24..0.28).contains(&claim.goal_speed_rad_per_s.to_f64()), "{}", claim.goal_speed_rad_per_s);
-    assert!(certificate.checked()[1].statement.contains("3 of them need longer than planned"));
+    assert!((0.27..0.36).contains(&claim.goal_speed_rad_per_s.to_f64()), "{}", claim.goal_speed_rad_per_s);
 }
 
 #[test]
 fn what_the_region_does_not_bear_is_rejected() {
-    let stored = stored("moving-goal", &derive(2000.0)).unwrap();
+    let stored = stored("moving-goal", &derive(700.0)).unwrap();
     let rejected = |edit: &dyn Fn(&mut MovingGoalClaim)| {
         let mut document = stored.document().clone();
         let Claim::MovingGoal(claim) = &mut document.claims[1].claim else { panic!("a moving goal") };
@@ -98,7 +97,7 @@ fn what_the_region_does_not_bear_is_rejected() {
     }
     for edit in [
         &|list: &mut certune::verify::GoalList| list.speed_rad_per_s = Number::decimal(0.4).unwrap(),
-        &|list: &mut certune::verify::GoalList| list.speed_rad_per_s = Number::decimal(0.2).unwrap(),
+        &|list: &mut certune::verify::GoalList| list.speed_rad_per_s = Number::decimal(0.1).unwrap(),
         &|list: &mut certune::verify::GoalList| list.goals[1].arrival_s = Number::decimal(5.0).unwrap(),
         &|list: &mut certune::verify::GoalList| list.goals[1].goal_rad[0] = Number::decimal(-1.0).unwrap(),
         &|list: &mut certune::verify::GoalList| {

@@ -1,5 +1,5 @@
 //! `claims/sampled.md` on the Panda: the published simulation gains at 1 kHz, gravity compensated, friction 1 to 3 N m s/rad.
-#![expect(clippy::panic, clippy::unwrap_used, reason = "test helpers")]
+#![expect(clippy::panic, reason = "test helpers")]
 
 use certune::Request;
 use certune::verify::{Certificate, Claim, ClaimKind, Number, SampledClaim, SampledFamily, family_box};

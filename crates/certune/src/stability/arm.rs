@@ -232,6 +232,9 @@ fn steps_rad(list: &GoalListValues) -> Vec<Vec<f64>> {
     let befores = std::iter::once(&list.start_rad).chain(goals.clone());
     goals
         .zip(befores)
-        .map(|(goal, before)| goal.iter().zip(before).map(|(goal, before)| goal - before).collect())
+        // As a person would write them: nine decimals.
+        .map(|(goal, before)| {
+            goal.iter().zip(before).map(|(goal, before)| ((goal - before) * 1e9).round() / 1e9).collect()
+        })
         .collect()
 }
