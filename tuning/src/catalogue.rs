@@ -38,7 +38,7 @@ pub const SCENARIOS: [(&str, &str); 6] = [
 pub const SPACES: [(&str, &str); 1] = [("panda-aic", include_str!("../spaces/panda-aic.toml"))];
 
 /// Proved constants, each record of one robot over one set of configurations.
-pub const CONSTANTS: [(&str, &str); 0] = [];
+pub const CONSTANTS: [(&str, &str); 1] = [("panda", include_str!("../constants/panda.json"))];
 
 /// The preset that a run is compared with when its search space names none.
 pub const DEFAULT_PRESET: &str = "pezzato2020-simulation";
