@@ -3,7 +3,7 @@
 use certune::certify::GoalListValues;
 use certune::closed_loop::{Gains, LawName, PlantBox, Scenario};
 use certune::dynamics::{Link, Robot, for_joint_count};
-use certune::verify::{Certificate, Evidence, Record};
+use certune::verify::{Certificate, ConfigurationSet, Evidence, Record};
 use certune::{Answer, ArmCertifier, ArmGains, Growth, Over, Request, certificate_text, family_of};
 use serde::Serialize;
 
@@ -80,6 +80,11 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
         })?;
     } else {
         let mut text = claims_in_words(&certificate, &growth, context.verbose);
+        let narrower = args.over.is_some_and(|over| over != OverName::Torus);
+        if narrower && certificate.document().constants.over == ConfigurationSet::AllAngles {
+            let note = "Note: no record of proved constants is at hand for those configurations alone; the claims are about all angles.";
+            text.push_str(&output::wrapped(note, 0));
+        }
         if let Some(note) = released_code(&gains) {
             text.push_str(&output::wrapped(note, 0));
         }
