@@ -33,6 +33,7 @@ use rayon::prelude::*;
 
 use crate::arm_box::ArmBox;
 use crate::error::BoundsError;
+use crate::rigorous::larger;
 use affine::Affine;
 use interval::Interval;
 
@@ -120,7 +121,7 @@ pub fn enclosure<const N: usize>(
         })
         .reduce_with(|a, b| Piece {
             mass: a.mass.zip_map(&b.mass, Interval::hull),
-            coriolis: a.coriolis.max(b.coriolis),
+            coriolis: larger(a.coriolis, b.coriolis),
         });
     // There is at least one piece.
     let Piece { mut mass, coriolis } = joined.unwrap_or(Piece { mass: JointMatrix::zeros(), coriolis: f64::INFINITY });
@@ -183,7 +184,7 @@ fn coriolis_bound<const N: usize>(slopes: &[JointMatrix<N, Affine<N>>; N]) -> f6
     }
     let at = |i: usize, j: usize, k: usize| middle[(i * N + j) * N + k];
     let flattenings: [JointMatrix<N, Interval>; 3] =
-        [gram(|row, a, b| at(row, a, b)), gram(|row, a, b| at(a, row, b)), gram(|row, a, b| at(a, b, row))];
+        [gram(at), gram(|row, a, b| at(a, row, b)), gram(|row, a, b| at(a, b, row))];
     let norm = flattenings.into_iter().map(largest_singular_value).fold(f64::INFINITY, f64::min);
     (Interval::from_f64(norm) + squares.sqrt()).upper()
 }
