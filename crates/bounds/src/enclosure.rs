@@ -33,6 +33,7 @@ use rayon::prelude::*;
 
 use crate::arm_box::ArmBox;
 use crate::error::BoundsError;
+use crate::rigorous::larger;
 use affine::Affine;
 use interval::Interval;
 
@@ -120,7 +121,7 @@ pub fn enclosure<const N: usize>(
         })
         .reduce_with(|a, b| Piece {
             mass: a.mass.zip_map(&b.mass, Interval::hull),
-            coriolis: a.coriolis.max(b.coriolis),
+            coriolis: larger(a.coriolis, b.coriolis),
         });
     // There is at least one piece.
     let Piece { mut mass, coriolis } = joined.unwrap_or(Piece { mass: JointMatrix::zeros(), coriolis: f64::INFINITY });

@@ -112,6 +112,16 @@ pub enum BoundsError {
         /// Boxes allowed.
         boxes: u64,
     },
+    /// A number of a plan that no proof can start from: negative, not finite, or 0 where it divides.
+    #[error("{parameter} of joint {joint} is {value}, expected a finite number >= 0, and > 0 for what k_m divides by")]
+    Candidate {
+        /// Which number of the plan.
+        parameter: &'static str,
+        /// Joint, counted from 1 at the base.
+        joint: usize,
+        /// The number.
+        value: f64,
+    },
     /// An axis of a search that is not a finite, ordered interval.
     #[error("search axis {axis} is {lower} to {upper}, expected lower <= upper, both finite")]
     Axis {

@@ -3,7 +3,7 @@
 
 use certune_bounds::riccati::riccati_bounds;
 use certune_bounds::rigorous::{AngleSet, Effort, PolygonPlan, polygon_bounds_with};
-use certune_bounds::{ArmBox, Ranges, RecordError, recheck, record};
+use certune_bounds::{ArmBox, BoundsError, Ranges, RecordError, recheck, record};
 use certune_dynamics::{Model, Robot};
 use certune_verify::{Number, Record};
 
@@ -77,4 +77,28 @@ fn a_record_that_claims_more_than_its_proofs_is_refused() {
     ));
     assert!(matches!(edited(&|r| r.proofs.clear()), RecordError::Parameter { .. }));
     assert!(matches!(edited(&|r| r.arm.sha256 = "0".repeat(64)), RecordError::OtherArm { .. }));
+}
+
+#[test]
+fn a_candidate_that_proves_nothing_is_refused() {
+    let robot = short_arm();
+    let record = proved(&robot);
+    let refused = |bound: &str, name: &str, change: fn(f64) -> f64| {
+        let mut edited = record.clone();
+        for proof in edited.proofs.iter_mut().filter(|proof| bound.is_empty() || proof.bound == bound) {
+            for number in proof.parameters.get_mut(name).into_iter().flatten() {
+                *number = Number::decimal(change(number.to_f64())).unwrap();
+            }
+        }
+        // What would follow if the sign were not looked at.
+        edited.bounds.k_m = Some(Number::decimal(1e-3).unwrap());
+        recheck::<2>(&edited.sealed(), &robot, &silent).unwrap_err()
+    };
+    // `k_r` and `k_m` name the same numbers; each is read from one of them.
+    for (bound, name) in [("k_r", "candidate"), ("k_m", "metric"), ("m_lo_kg_m2", "candidate")] {
+        let error = refused(bound, name, |x| -x);
+        assert!(matches!(error, RecordError::Bounds(BoundsError::Candidate { .. })), "{bound}: {error}");
+    }
+    let error = refused("k_m", "metric", |_| 0.0);
+    assert!(matches!(error, RecordError::Bounds(BoundsError::Candidate { parameter: "metric", .. })), "{error}");
 }

@@ -36,6 +36,30 @@ pub struct RiccatiPlan {
     pub budget: u64,
 }
 
+impl RiccatiPlan {
+    /// What is proved is about `|k_j|` and diagonals below M; what follows from it divides by the latter, so signs matter.
+    fn check(&self) -> Result<(), BoundsError> {
+        let refused = |parameter, joint: usize, value| Err(BoundsError::Candidate { parameter, joint: joint + 1, value });
+        let lists = [
+            ("m_lo", std::slice::from_ref(&self.m_lo_kg_m2)),
+            ("diagonal", self.diagonal_lower_kg_m2.as_slice()),
+            ("k", self.k_joint.as_slice()),
+            ("metric", self.metric_kg_m2.as_slice()),
+        ];
+        for (parameter, numbers) in lists {
+            if let Some(joint) = numbers.iter().position(|x| !(*x >= 0.0 && x.is_finite())) {
+                return refused(parameter, joint, numbers[joint]);
+            }
+        }
+        for (joint, (k, metric)) in self.k_joint.iter().zip(&self.metric_kg_m2).enumerate() {
+            if *k > 0.0 && *metric <= 0.0 {
+                return refused("metric", joint, *metric);
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Every configuration of a set lies in these intervals, up to full turns.
 pub(crate) fn intervals<const N: usize>(set: &AngleSet<N>) -> Result<[[f64; 2]; N], BoundsError> {
     let mut out = [[-HALF_TURN, HALF_TURN]; N];
@@ -242,6 +266,7 @@ impl<'a, const N: usize> Proving<'a, N> {
                 return Err(BoundsError::Length { given: length, expected: N });
             }
         }
+        plan.check()?;
         let mut wanted = vec![
             Inequality::Inertia { kg_m2: vec![plan.m_lo_kg_m2; N] },
             Inequality::Inertia { kg_m2: plan.diagonal_lower_kg_m2.clone() },
@@ -264,7 +289,7 @@ impl<'a, const N: usize> Proving<'a, N> {
         (self.progress)(1.0);
         let up = 1.0 + 1e-13;
         let k_r = plan.k_joint.iter().map(|k| k * k).sum::<f64>().sqrt() * up;
-        let terms = plan.k_joint.iter().zip(&plan.metric_kg_m2).filter(|(k, _)| **k > 0.0).map(|(k, e)| k * k / e);
+        let terms = plan.k_joint.iter().zip(&plan.metric_kg_m2).filter(|(k, _)| **k != 0.0).map(|(k, e)| k * k / e);
         let k_m = terms.sum::<f64>().sqrt() * up;
         RiccatiBounds {
             m_lo_kg_m2: plan.m_lo_kg_m2,

@@ -19,7 +19,7 @@ use certune_dynamics::Model;
 
 use crate::error::BoundsError;
 use crate::rigorous::definite::exceeds;
-use crate::rigorous::scalar::{Majorant, Scalar};
+use crate::rigorous::scalar::{Majorant, Scalar, larger};
 
 /// Relative error that every number of an arm may carry.
 const DATA: f64 = 1.0 / (1_u64 << 48) as f64;
@@ -101,7 +101,7 @@ impl<const N: usize> Chain<N, f64> {
         let bounds = self.majorant();
         for j in 0..N {
             let allowance = bounds.second_moments(j).map(|row| row.map(Majorant::bound));
-            let size = bounds.second_moments(j).iter().flatten().map(|x| x.magnitude()).fold(0.0, f64::max);
+            let size = bounds.second_moments(j).iter().flatten().map(|x| x.magnitude()).fold(0.0, larger);
             if size <= 0.0 || exceeds(&checked.second_moments(j), &allowance) {
                 continue;
             }
@@ -155,7 +155,7 @@ fn rotation_error(r: &Mat3<f64>) -> f64 {
     for a in 0..3 {
         for b in 0..3 {
             let product: f64 = (0..3).map(|k| r[k][a] * r[k][b]).sum();
-            deviation = deviation.max((product - if a == b { 1.0 } else { 0.0 }).abs());
+            deviation = larger(deviation, (product - if a == b { 1.0 } else { 0.0 }).abs());
         }
     }
     3.0 * deviation + DATA

@@ -27,7 +27,7 @@ use crate::eigen::symmetric_eigen;
 use crate::rigorous::angle::{Points, degree_two_factor};
 use crate::rigorous::chain::{Chain, Mat3, Step, Vec3, compose, identity};
 use crate::rigorous::definite::{Factor, cholesky_allowance};
-use crate::rigorous::scalar::{Majorant, Scalar, UNIT};
+use crate::rigorous::scalar::{Majorant, Scalar, UNIT, larger};
 use crate::rigorous::sweep::Sweep;
 
 /// A bound is raised to what a grid point needs and this much more, relative.
@@ -366,7 +366,7 @@ impl<const N: usize> Sweep for CoriolisSweep<N> {
                 while !passes(norm * norm, slack(norm * norm)) && norm.is_finite() {
                     norm = norm * (1.0 + RAISE) + f64::MIN_POSITIVE.sqrt();
                 }
-                state.norm = state.norm.max(norm);
+                state.norm = larger(state.norm, norm);
                 limit = state.norm * state.norm;
                 shift = slack(limit);
             }

@@ -23,7 +23,7 @@ use crate::eigen::symmetric_eigen;
 use crate::rigorous::angle::{Points, Span};
 use crate::rigorous::chain::{Chain, Step, Vec3, compose, identity, turned};
 use crate::rigorous::definite::{Factor, cholesky_allowance};
-use crate::rigorous::scalar::{Majorant, Scalar, UNIT, frobenius};
+use crate::rigorous::scalar::{Majorant, Scalar, UNIT, frobenius, larger};
 use crate::rigorous::sweep::Sweep;
 
 /// A bound is raised to what a corner needs and this much more, relative.
@@ -156,7 +156,7 @@ impl<const N: usize> GravitySweep<N> {
             first,
             wanted,
             along: row[2].abs(),
-            radius: gammas.iter().map(length).fold(0.0, f64::max),
+            radius: gammas.iter().map(length).fold(0.0, larger),
             unit_radius,
             gammas,
             stiffness_allowance,
@@ -248,11 +248,11 @@ impl<const N: usize> GravitySweep<N> {
             let here = match self.unit_radius {
                 Some(radius) => most(radius),
                 None => {
-                    let largest = self.gammas.iter().map(|gamma| dot(gamma, v).abs()).fold(0.0, f64::max);
+                    let largest = self.gammas.iter().map(|gamma| dot(gamma, v).abs()).fold(0.0, larger);
                     largest * (1.0 + 16.0 * UNIT) + self.torque_allowance[j]
                 }
             };
-            state.torque[j] = state.torque[j].max(here);
+            state.torque[j] = larger(state.torque[j], here);
         }
     }
 
@@ -269,7 +269,7 @@ impl<const N: usize> GravitySweep<N> {
                 }
             }
             if !self.suffices(state.stiffness, &stiffness) {
-                state.stiffness = state.stiffness.max(self.raised(&stiffness));
+                state.stiffness = larger(state.stiffness, self.raised(&stiffness));
             }
         }
     }

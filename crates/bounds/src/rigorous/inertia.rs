@@ -27,7 +27,7 @@ use crate::error::BoundsError;
 use crate::rigorous::angle::Points;
 use crate::rigorous::chain::{Chain, Step, Sym4, compose, composite, identity, turned};
 use crate::rigorous::definite::{Factor, cholesky_allowance};
-use crate::rigorous::scalar::{Majorant, Scalar, UNIT, frobenius};
+use crate::rigorous::scalar::{Majorant, Scalar, UNIT, frobenius, larger};
 use crate::rigorous::sweep::Sweep;
 
 /// A bound is raised to what a corner needs and this much more, relative.
@@ -161,7 +161,7 @@ impl<const N: usize> InertiaSweep<N> {
                     radii.len() - 1
                 }
             };
-            radii[class] = radii[class].max(square);
+            radii[class] = larger(radii[class], square);
             inside.push((class, inner(&chain, *corner)));
         }
         let own = std::array::from_fn(|j| chain.second_moments(j));
@@ -280,7 +280,7 @@ impl<const N: usize> Sweep for InertiaSweep<N> {
                 state.maximum * self.weights[0] - inertia - shift - square > 0.0
             });
             if !passes {
-                state.maximum = state.maximum.max(self.raised(&self.matrix(&outer, &composite, at)));
+                state.maximum = larger(state.maximum, self.raised(&self.matrix(&outer, &composite, at)));
                 factor = self.block(&outer, self.radii[class], state.maximum);
                 shift = self.shift(state.maximum);
             }
@@ -306,7 +306,7 @@ fn allowance<const N: usize>(chain: &Chain<N, f64>, rotor: &[f64; N], corners: &
     }
     let outer = outer(&steps, &composites);
     let inner = inner(&bounds, at(1));
-    let square = Majorant::input(radii.iter().fold(0.0, |largest, r| largest.max(*r)), 0.0);
+    let square = Majorant::input(radii.iter().fold(0.0, |largest, r| larger(largest, *r)), 0.0);
     let rotor = |j: usize| Majorant::input(rotor[j], rotor[j] / (1_u64 << 48) as f64);
     let mut errors = [[0.0; N]; N];
     let composite = UPPER.map(|(i, k)| composites[1][i][k]);

@@ -52,6 +52,7 @@ use crate::rigorous::coriolis::CoriolisSweep;
 use crate::rigorous::gravity::{GravitySweep, Wanted, first_joint};
 use crate::rigorous::inertia::InertiaSweep;
 use crate::rigorous::scalar::UNIT;
+pub(crate) use crate::rigorous::scalar::larger;
 use crate::rigorous::sweep::{Progress, maxima};
 
 pub use plan::{Effort, PolygonPlan};
@@ -236,9 +237,9 @@ fn gravity_bounds<const N: usize>(
         let share = 0.7 / nominal.len() as f64;
         let part = progress.part(k as f64 * share, (k + 1) as f64 * share);
         let (found, rounding) = both(&Chain::new(model), &plan.gravity_pieces, N, part)?;
-        total.stiffness = total.stiffness.max(found[0]);
+        total.stiffness = larger(total.stiffness, found[0]);
         for (torque, found) in total.torque.iter_mut().zip(&found[1..]) {
-            *torque = torque.max(*found);
+            *torque = larger(*torque, *found);
         }
         total.rounding = total.rounding.max(rounding);
     }
@@ -289,7 +290,7 @@ fn coriolis_bound<const N: usize>(
     for (k, model) in nominal.iter().enumerate() {
         let share = 0.8 / nominal.len() as f64;
         let found = whole(&Chain::new(model), progress.part(k as f64 * share, (k + 1) as f64 * share))?;
-        total = total.max(found.0);
+        total = larger(total, found.0);
         rounding = rounding.max(found.1);
     }
     for (link, (group, uncertainty)) in arms.uncertain_links().enumerate() {

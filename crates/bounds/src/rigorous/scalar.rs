@@ -25,6 +25,12 @@ use std::ops::{Add, Mul, Neg, Sub};
 /// Unit roundoff of `f64`.
 pub(crate) const UNIT: f64 = f64::EPSILON / 2.0;
 
+/// The larger of two upper bounds; infinite when one of them is not a number, which `f64::max` would drop.
+#[inline]
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::INFINITY } else { a.max(b) }
+}
+
 /// A number that the recursions can run over.
 pub(crate) trait Scalar:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>

@@ -8,6 +8,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
 
+use crate::rigorous::scalar::larger;
+
 /// Chunks per sweep, at least, where the product is large enough.
 const CHUNKS: usize = 256;
 /// Corners that the first, thinned sweep visits, about.
@@ -98,7 +100,7 @@ fn all<S: Sweep>(sweep: &S, first: usize, corners: &[Vec<[f64; 2]>], start: &[f6
             maxima = result;
         } else {
             for (maximum, value) in maxima.iter_mut().zip(result) {
-                *maximum = maximum.max(value);
+                *maximum = larger(*maximum, value);
             }
         }
     }
