@@ -382,7 +382,15 @@ fn refused<const N: usize>(subject: &Subject<N>, claim: &RefusedClaim, params: &
         .with_rotor_inertia(&Joints::repeat(attained.rotor_inertia_kg_m2.to_f64()))
         .with_friction(&Joints::repeat(attained.friction_n_m_s_per_rad.to_f64()), &Joints::zeros());
     let q = Joints::from_vec(numbers(&attained.q_rad));
-    let closed = linearise_aic(&model, &q, params, subject.plant_box.gravity_compensation).unwrap();
-    assert!(closed.spectral_abscissa_per_s() > 0.0, "{}: the refusal's arm is stable", subject.name);
+    let compensated = subject.plant_box.gravity_compensation;
+    let grows = match &claim.sampling {
+        None => linearise_aic(&model, &q, params, compensated).unwrap().spectral_abscissa_per_s() > 0.0,
+        Some(timing) => {
+            let samples = (timing.delay_s.to_f64() / timing.period_s.to_f64()).round() as usize;
+            let closed = linearise_aic_sampled(&model, &q, params, compensated, samples).unwrap();
+            closed.eigenvalues().into_iter().any(|z| z.norm() > 1.0)
+        }
+    };
+    assert!(grows, "{}: the refusal's arm is stable", subject.name);
     tally.attacks += 1;
 }

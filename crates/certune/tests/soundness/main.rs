@@ -34,7 +34,7 @@ use subjects::{Subject, effort};
 
 const SEED: u64 = 0xCE27;
 /// Rounds when no time is given; each questions the Panda and one serial arm of 2 to 7 joints.
-const ROUNDS: u64 = 24;
+const ROUNDS: u64 = 8;
 /// Gain sets that one subject is questioned with.
 const GAIN_SETS: u64 = 24;
 
