@@ -145,7 +145,7 @@ impl MracGainValues {
         let three = |quantity, [first, second, third]: &[Vec<f64>; 3]| {
             Ok([numbers(quantity, first)?, numbers(quantity, second)?, numbers(quantity, third)?])
         };
-        Ok(Gains::Mrac(MracGains {
+        Ok(Gains::Mrac(Box::new(MracGains {
             law: self.law,
             omega_rad_per_s: numbers("omega_rad_per_s", &self.omega_rad_per_s)?,
             zeta: numbers("zeta", &self.zeta)?,
@@ -156,7 +156,7 @@ impl MracGainValues {
             e1: three("e1", &self.e1)?,
             f0: three("f0", &self.f0)?,
             f1: three("f1", &self.f1)?,
-        }))
+        })))
     }
 }
 

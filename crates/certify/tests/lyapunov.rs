@@ -1,5 +1,5 @@
 //! Textbook loops and polytopes under the Lyapunov checker: what is stable is proved, what is not is refused with a matrix.
-#![expect(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
+#![expect(clippy::unwrap_used, reason = "test helpers")]
 
 use certune_certify::{LinearFamily, LyapunovFailure, LyapunovMatrix, SolveError, fastest_decay, lyapunov};
 use certune_verify::{LyapunovClaim, LyapunovWitness, Number, PlaneRegion};

@@ -6,7 +6,6 @@ use sha2::{Digest, Sha256};
 use crate::claims::{Claim, ClaimKind, Inequality, Verdict};
 use crate::document::{Arm, ArmRanges, Bounds, ConfigurationSet, Document, Entry, Evidence, Grade, InertiaEnclosure};
 use crate::error::{Flaw, Rejection, VerifyError};
-use crate::number::positive;
 use crate::quantity::{
     require, require_at_least_zero, require_interval, require_length, require_plain, require_positive, require_sha256,
 };
@@ -219,10 +218,12 @@ pub(crate) fn check_bounds(arm: &Arm, arms: &ArmRanges, over: &ConfigurationSet,
             require_plain("diagonal_kg_m2", upper)?;
             require("diagonal_kg_m2", upper, lower.value() < upper.value(), "an upper bound beyond the lower one")?;
             require("diagonal_kg_m2", upper, rotor <= upper.value(), too_small)?;
+            require("diagonal_kg_m2", upper, least.value() <= upper.value(), "a number no smaller than m_lo_kg_m2")?;
+            require("diagonal_kg_m2", lower, lower.value() <= largest.value(), "a number no larger than m_hi_kg_m2")?;
         }
     }
     if let Some(inertia) = &bounds.inertia {
-        check_inertia(arm, inertia)?;
+        check_inertia(arm, inertia, rotor, bounds)?;
     }
     if let Some(torques) = &bounds.gravity_torque_n_m {
         require_length("gravity_torque_n_m", torques.len(), arm.joints)?;
@@ -233,7 +234,8 @@ pub(crate) fn check_bounds(arm: &Arm, arms: &ArmRanges, over: &ConfigurationSet,
     Ok(())
 }
 
-fn check_inertia(arm: &Arm, inertia: &InertiaEnclosure) -> Result<(), Flaw> {
+/// Every diagonal entry of M lies between its least and largest eigenvalue: an enclosure that denies it would be of no arm, and anything would hold of it.
+fn check_inertia(arm: &Arm, inertia: &InertiaEnclosure, rotor: &BigRational, bounds: &Bounds) -> Result<(), Flaw> {
     for matrix in [&inertia.midpoint_kg_m2, &inertia.radius_kg_m2] {
         require_length("inertia", matrix.len(), arm.joints)?;
         for row in matrix {
@@ -249,11 +251,15 @@ fn check_inertia(arm: &Arm, inertia: &InertiaEnclosure) -> Result<(), Flaw> {
     for radius in inertia.radius_kg_m2.iter().flatten() {
         require_at_least_zero("radius_kg_m2", radius)?;
     }
-    // The diagonal of an inertia matrix is positive: an enclosure below 0 would be of no arm at all.
     for joint in 0..arm.joints {
         let (middle, radius) = (&inertia.midpoint_kg_m2[joint][joint], &inertia.radius_kg_m2[joint][joint]);
-        let largest = middle.value() + radius.value();
-        require("midpoint_kg_m2", middle, positive(&largest), "an enclosure that some inertia matrix is in")?;
+        let [lower, upper] = [middle.value() - radius.value(), middle.value() + radius.value()];
+        let diagonal = bounds.diagonal_kg_m2.as_ref().map(|ends| ends.each_ref().map(|list| list[joint].value()));
+        let met = lower <= *bounds.m_hi_kg_m2.value()
+            && *bounds.m_lo_kg_m2.value() <= upper
+            && *rotor <= upper
+            && diagonal.is_none_or(|[least, largest]| lower <= *largest && *least <= upper);
+        require("midpoint_kg_m2", middle, met, "an enclosure that the other constants and the rotor inertia allow")?;
     }
     require_at_least_zero("coriolis_kg_m2", &inertia.coriolis_kg_m2)
 }

@@ -10,12 +10,11 @@ use crate::quantity::{require_at_least_zero, require_length, require_positive};
 /// A controller with its gains.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "controller", rename_all = "kebab-case")]
-#[expect(clippy::large_enum_variant, reason = "one of them in a document")]
 pub enum Gains {
     /// The active inference controller.
     Aic(AicGains),
     /// The model reference adaptive controller.
-    Mrac(MracGains),
+    Mrac(Box<MracGains>),
 }
 
 impl Gains {

@@ -94,7 +94,7 @@ impl Record {
             outer[0].value() <= inner[0].value() && inner[1].value() <= outer[1].value()
         };
         let no_payload = *ranges.payload_kg[1].value() == BigRational::from_integer(0.into());
-        if self.arm.sha256 != arm.sha256 || self.arm.joints != arm.joints {
+        if self.arm != *arm {
             Err("it is about another arm")
         } else if ranges.mass_uncertainty.value() > self.arms.mass_uncertainty.value() {
             Err("its mass uncertainty is smaller")

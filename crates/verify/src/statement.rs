@@ -87,6 +87,14 @@ pub(crate) fn configurations(over: &ConfigurationSet) -> String {
     }
 }
 
+/// `any configuration`, of those that the constants hold for.
+pub(crate) fn any_configuration(document: &Document) -> &'static str {
+    match document.constants.over {
+        ConfigurationSet::AllAngles => "any configuration",
+        ConfigurationSet::Box { .. } => "any configuration of the set",
+    }
+}
+
 fn condition(document: &Document) -> String {
     let bounds = bounds(&document.constants.bounds);
     match &document.constants.evidence {
@@ -147,6 +155,14 @@ pub(crate) fn statement(document: &Document, claim: &Claim) -> String {
     }
 }
 
+/// How a refusal opens whose counterexample is as good as the constants.
+pub(crate) fn refused(document: &Document) -> &'static str {
+    match allowed_grade(&document.constants.evidence).0 {
+        Grade::Conditional => "Refused, if the stated constants hold",
+        Grade::Proved => "Refused",
+    }
+}
+
 /// What the claims of a document take for granted.
 pub(crate) fn assumptions(document: &Document) -> Vec<Assumption> {
     let numbers = bounds(&document.constants.bounds);
@@ -158,8 +174,8 @@ pub(crate) fn assumptions(document: &Document) -> Vec<Assumption> {
         )),
         Evidence::Proved { record_sha256 } => Assumption {
             text: format!(
-                "The constants ({numbers}) are those of the record {record_sha256}, proved by outward-rounded arithmetic; `verify --full` \
-                 derives them again from the arm"
+                "The constants ({numbers}) are those of the record {record_sha256}, proved by outward-rounded arithmetic. A record is as good as \
+                 its source: it has to be one that the reader trusts, or has derived again from the arm with `verify --full`"
             ),
             grade: Grade::Proved,
         },

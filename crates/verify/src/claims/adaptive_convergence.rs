@@ -30,7 +30,7 @@ use crate::gains::MracLaw;
 use crate::mrac::{Adaptation, goal, room};
 use crate::number::{Number, positive, ratio};
 use crate::quantity::{require, require_length, require_plain, require_positive};
-use crate::statement::each;
+use crate::statement::{each, refused};
 
 /// The error of the adaptive loop converges.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -294,11 +294,12 @@ impl Provable for AdaptiveRefusedClaim {
         ClaimKind::AdaptiveConvergence
     }
 
-    fn sentence(&self, _: &Document) -> String {
+    fn sentence(&self, document: &Document) -> String {
         format!(
-            "Refused: from the goal [{}] rad with a small velocity along [{}], reference at the goal, every function V of the claim's form rises, whatever \
+            "{}: from the goal [{}] rad with a small velocity along [{}], reference at the goal, every function V of the claim's form rises, whatever \
              its Lambda, for every inertia matrix of the enclosure and the least friction. So none of them proves convergence; that the loop \
              diverges is not claimed.",
+            refused(document),
             each(&self.goal_rad),
             each(&self.direction)
         )

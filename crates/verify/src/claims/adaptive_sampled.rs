@@ -21,7 +21,7 @@ use crate::error::Flaw;
 use crate::mrac::{Adaptation, goal, room};
 use crate::number::{Number, positive, ratio};
 use crate::quantity::require_positive;
-use crate::statement::each;
+use crate::statement::{each, refused};
 
 /// The sampled velocity loop decays, or (as [`Claim::AdaptiveSampledRefused`](super::Claim)) grows.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -129,9 +129,10 @@ impl Provable for AdaptiveSampledRefusedClaim {
         ClaimKind::AdaptiveSampled
     }
 
-    fn sentence(&self, _: &Document) -> String {
+    fn sentence(&self, document: &Document) -> String {
         format!(
-            "Refused: {} is unstable for every arm of the family at the goal, because of joint {}.",
+            "{}: {} is unstable for every arm of the family at the goal, because of joint {}.",
+            refused(document),
             self.velocity_loop.in_words(),
             self.joint
         )

@@ -23,6 +23,7 @@ use crate::error::Flaw;
 use crate::number::{Number, positive};
 use crate::polytope::{AffineFamily, BoxFlaw};
 use crate::quantity::require_positive;
+use crate::statement::any_configuration;
 
 const DEGREE: usize = 6;
 
@@ -41,11 +42,12 @@ impl Provable for ExponentialClaim {
         ClaimKind::Exponential
     }
 
-    fn sentence(&self, _: &Document) -> String {
+    fn sentence(&self, document: &Document) -> String {
         format!(
-            "linearised at rest at any configuration, the loop is exponentially stable, every mode decaying faster than exp(-{} t), t in s{}",
+            "linearised at rest at {}, the loop is exponentially stable, every mode decaying faster than exp(-{} t), t in s{}",
+            any_configuration(document),
             self.rate_per_s,
-            stays_stable(&self.margins)
+            stays_stable(document, &self.margins, None)
         )
     }
 

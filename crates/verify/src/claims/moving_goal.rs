@@ -83,20 +83,29 @@ impl Provable for MovingGoalClaim {
     }
 
     fn sentence(&self, document: &Document) -> String {
-        let sampled = region_before(document, document.claims.len(), self.region)
+        let period = region_before(document, document.claims.len(), self.region)
             .and_then(|region| region.norm(document))
-            .is_ok_and(|norm| norm.period.is_some());
-        let (changes, instants) = if sampled {
-            (" and changes at sample instants, before the controller's step", " at every sample")
-        } else {
-            ("", "")
+            .ok()
+            .and_then(|norm| norm.period);
+        let (instants, changes) = match period {
+            Some(_) => (" at every sample", ", which changes at sample instants alone, before the controller's step"),
+            None => ("", ""),
+        };
+        let step = |speed: &Number| {
+            let most = period.as_ref().map(|period| Number::exact(speed.value() * period));
+            most.map(|most| format!(" and by no more than {most} rad at a sample")).unwrap_or_default()
         };
         let mut text = format!(
             "started at rest at the goal, beliefs at the measurement and zero controller torque, the state stays in the set V <= 1 of claim {}, \
-             so that every limit stated there is kept, and the arm{instants} within {} rad of the goal, as long as the goal moves at no more \
-             than {} rad/s (2-norm over the joints, along any path){changes}; and as long as it jumps by no more than {} rad at a time, at least \
-             {} s apart",
-            self.region, self.distance_rad, self.goal_speed_rad_per_s, self.jump_rad, self.dwell_s
+             so that every limit stated there is kept, and the arm{instants} within {} rad of the goal{changes}, as long as the goal moves at no \
+             more than {} rad/s{} (2-norm over the joints, along any path); or, with the goal standing still between jumps, as long as it jumps by no \
+             more than {} rad at a time, at least {} s apart",
+            self.region,
+            self.distance_rad,
+            self.goal_speed_rad_per_s,
+            step(&self.goal_speed_rad_per_s),
+            self.jump_rad,
+            self.dwell_s
         );
         if let ConfigurationSet::Box { .. } = document.constants.over {
             text.push_str(
@@ -107,11 +116,12 @@ impl Provable for MovingGoalClaim {
             let late = list.goals.iter().filter(|goal| goal.arrival_s.value() > goal.duration_s.value()).count();
             let _ = write!(
                 text,
-                "; and from {} rad through the {} goals of the list, each approached in a straight line at {} rad/s from the moment it is set \
+                "; or, started at rest at {} rad, as long as it goes through the {} goals of the list, each approached in a straight line at {} rad/s{} from the moment it is set \
                  and left no sooner than planned and no sooner than reached:",
                 vector(&list.start_rad),
                 list.goals.len(),
-                list.speed_rad_per_s
+                list.speed_rad_per_s,
+                step(&list.speed_rad_per_s)
             );
             for goal in &list.goals {
                 let _ = write!(

@@ -2,12 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::refused::check_remedies;
+use super::refused::{check_remedies, linearised_loop};
 use super::sampled::{LoopTiming, milliseconds};
 use super::variation::{Variation, would_be_stable};
-use super::{ClaimKind, Inequality, Provable};
+use super::{ClaimKind, Inequality, Provable, family_box};
 use crate::document::Document;
 use crate::error::Flaw;
+use crate::gains::{Gains, MracLaw};
 use crate::number::Number;
 use crate::quantity::require_plain;
 
@@ -67,16 +68,51 @@ impl Reason {
                  and the proof does not apply"
             }
             Self::FamilyNotCovered => "the proof does not cover families of this kind",
-            Self::TooSlow => "the loops of the box are stable, but at no rate of at least 0.001 per s",
-            Self::NoPointFound => "the box is not shown stable, and no unstable point of it was found",
+            Self::TooSlow => {
+                "the loops of the box of the stated constants are stable, but no rate of at least 0.001 per s was certified"
+            }
+            Self::NoPointFound => "the box was not shown stable, and no unstable point of it was found",
             Self::Infeasible => {
                 "no Lyapunov function of the claim's form was found, and no counterexample was searched"
             }
             Self::CandidateFailed => "the solver's candidates did not pass the exact check",
             Self::ConstantsContradicted => {
-                "a search found an arm of the family outside the stated constants: they do not hold, and nothing is claimed"
+                "a search in floating point, which is not checked, reported an arm of the family outside the stated constants: nothing is claimed"
             }
             Self::OutOfRange => "a number of the problem is too large or too small to be worked with",
+        }
+    }
+}
+
+impl NotProvedClaim {
+    /// What a reason says of the loops or the gains is checked; the others speak of a search that led nowhere.
+    fn check_reason(&self, document: &Document) -> Result<(), Flaw> {
+        let of_adaptive =
+            matches!(self.of, ClaimKind::AdaptiveConvergence | ClaimKind::PiExponential | ClaimKind::AdaptiveSampled);
+        let borne_out = match (self.reason, &document.gains) {
+            (Reason::TooSlow, _) => {
+                return linearised_loop(document, self.of, self.sampling.as_ref())?.stable_on(&family_box(document));
+            }
+            (Reason::OtherController, Gains::Aic(_)) => of_adaptive,
+            (Reason::OtherController, Gains::Mrac(_)) => !of_adaptive,
+            (Reason::UnequalGains, Gains::Aic(gains)) => gains.shared_by_all().is_err(),
+            (Reason::UnequalGains, Gains::Mrac(_)) | (Reason::ReleasedCode, Gains::Aic(_)) => false,
+            (Reason::ReleasedCode, Gains::Mrac(gains)) => gains.law == MracLaw::ReleasedCode,
+            (
+                Reason::ConstantMissing
+                | Reason::FamilyNotCovered
+                | Reason::NoPointFound
+                | Reason::Infeasible
+                | Reason::CandidateFailed
+                | Reason::ConstantsContradicted
+                | Reason::OutOfRange,
+                _,
+            ) => true,
+        };
+        if borne_out {
+            Ok(())
+        } else {
+            Err(Flaw::quantity("reason", self.reason.in_words(), "one that the gains bear out"))
         }
     }
 }
@@ -86,18 +122,18 @@ impl Provable for NotProvedClaim {
         self.of
     }
 
-    fn sentence(&self, _: &Document) -> String {
+    fn sentence(&self, document: &Document) -> String {
         let distance = self
             .distance
             .as_ref()
-            .map(|d| format!(" Distance to feasibility: {d} in the solver's units."))
+            .map(|d| format!(" Distance to feasibility as the solver reported it: {d} in its units."))
             .unwrap_or_default();
         let sampled = self
             .sampling
             .as_ref()
             .map(|s| format!(", {}, with delays up to {} ms", s.in_words(), milliseconds(&s.delay_s)))
             .unwrap_or_default();
-        let remedies = would_be_stable(&self.remedies);
+        let remedies = would_be_stable(document, &self.remedies, self.sampling.as_ref());
         format!("Not proved ({}{sampled}): {}.{distance}{remedies}", self.of.name(), self.reason.in_words())
     }
 
@@ -109,6 +145,7 @@ impl Provable for NotProvedClaim {
         if let Some(sampling) = &self.sampling {
             sampling.check()?;
         }
+        self.check_reason(document)?;
         check_remedies(document, self.of, self.sampling.as_ref(), &self.remedies)?;
         if let Some(distance) = &self.distance {
             require_plain("distance", distance)?;

@@ -137,7 +137,7 @@ impl Provable for PiRefusedClaim {
     fn sentence(&self, _: &Document) -> String {
         format!(
             "Refused: at the goal [{}] rad the frozen loop with the gains of joint {}, inertia {} kg m^2 and that joint's least friction is not asymptotically \
-             stable. The inertia lies in the family's interval but is not shown to be that of an arm of the family.",
+             stable. The inertia lies in the interval of the stated constants but is not shown to be that of an arm of the family.",
             each(&self.goal_rad),
             self.joint,
             self.inertia_kg_m2

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::sampled::{LoopTiming, milliseconds};
 use super::variation::{Variation, varied, would_be_stable};
 use super::{ClaimKind, Inequality, LoopBox, LoopFamily, Provable, family_box};
-use crate::document::Document;
+use crate::document::{ConfigurationSet, Document};
 use crate::error::Flaw;
 use crate::number::Number;
 use crate::quantity::{require, require_at_least_zero, require_length, require_plain, require_within};
@@ -68,7 +68,7 @@ impl Provable for RefusedClaim {
         self.of
     }
 
-    fn sentence(&self, _: &Document) -> String {
+    fn sentence(&self, document: &Document) -> String {
         let wanted = if self.rate_per_s.value().is_positive() {
             format!("does not decay faster than exp(-{} t), t in s", self.rate_per_s)
         } else {
@@ -96,10 +96,10 @@ impl Provable for RefusedClaim {
                 );
             }
             None => text.push_str(
-                " The point lies in the family's box of constants but is not shown attainable by an arm of the family.",
+                " The point lies in the box of the stated constants but is not shown attainable by an arm of the family.",
             ),
         }
-        text.push_str(&would_be_stable(&self.remedies));
+        text.push_str(&would_be_stable(document, &self.remedies, self.sampling.as_ref()));
         text
     }
 
@@ -130,12 +130,12 @@ impl Provable for RefusedClaim {
 }
 
 /// The linearised loops that a claim is about.
-enum LinearisedLoop<'a> {
+pub(crate) enum LinearisedLoop<'a> {
     Continuous(LoopFamily),
     Sampled(SampledFamily, &'a LoopTiming),
 }
 
-fn linearised_loop<'a>(
+pub(crate) fn linearised_loop<'a>(
     document: &Document,
     of: ClaimKind,
     sampling: Option<&'a LoopTiming>,
@@ -166,7 +166,7 @@ impl LinearisedLoop<'_> {
         }
     }
 
-    fn stable_on(&self, range: &LoopBox) -> Result<(), Flaw> {
+    pub(crate) fn stable_on(&self, range: &LoopBox) -> Result<(), Flaw> {
         let zero = BigRational::zero();
         match self {
             Self::Continuous(loops) => loops.decays_on(range, &zero),
@@ -202,6 +202,11 @@ fn check_attained(document: &Document, point: &BoxPoint, rate: &Number, attained
     }
     for angle in &attained.q_rad {
         require_plain("q_rad", angle)?;
+    }
+    if let ConfigurationSet::Box { lower_rad, upper_rad } = &document.constants.over {
+        for ((angle, lower), upper) in attained.q_rad.iter().zip(lower_rad).zip(upper_rad) {
+            require_within("q_rad", angle, [lower.value(), upper.value()])?;
+        }
     }
     let one = BigRational::from_integer(1.into());
     let share = family.arms.mass_uncertainty.value();

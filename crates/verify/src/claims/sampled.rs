@@ -13,6 +13,7 @@ use crate::error::Flaw;
 use crate::number::{Number, ratio};
 use crate::quantity::{require, require_at_least_zero, require_positive};
 use crate::sampled_loops::{PlantStep, SampledFamily};
+use crate::statement::any_configuration;
 
 /// How often the controller runs, and how late its torque acts on which plant.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,6 +47,15 @@ impl LoopTiming {
         format!("sampled every {} ms with a held torque, {plant}", milliseconds(&self.period_s))
     }
 
+    /// The constant delays up to one, as they are checked.
+    pub(crate) fn delays(&self, longest_s: &Number) -> String {
+        let longest = milliseconds(longest_s);
+        match self.plant {
+            PlantStep::SemiImplicit => format!("a delay of any whole number of samples up to {longest} ms"),
+            PlantStep::ZeroOrderHold => format!("any constant delay up to {longest} ms"),
+        }
+    }
+
     /// The whole number of samples that the delay is, if it is.
     pub(crate) fn whole_samples(&self) -> Option<usize> {
         let samples = self.delay_samples();
@@ -76,19 +86,16 @@ impl Provable for SampledClaim {
         ClaimKind::Sampled
     }
 
-    fn sentence(&self, _: &Document) -> String {
-        let delays = match self.sampling.plant {
-            PlantStep::SemiImplicit => "a delay of any whole number of samples",
-            PlantStep::ZeroOrderHold => "any constant delay",
-        };
+    fn sentence(&self, document: &Document) -> String {
+        let delays = self.sampling.delays(&self.sampling.delay_s);
         format!(
-            "linearised at rest at any configuration and {}, the loop is exponentially stable with {delays} up to {} ms, every mode decaying faster than \
-             exp(-{} t), t in s; and stable with {delays} up to {} ms{}",
+            "linearised at rest at {} and {}, the loop is exponentially stable with {delays}, every mode decaying faster than exp(-{} t), t in s; and \
+             stable with {}{}",
+            any_configuration(document),
             self.sampling.in_words(),
-            milliseconds(&self.sampling.delay_s),
             self.rate_per_s,
-            milliseconds(&self.delay_margin_s),
-            stays_stable(&self.margins)
+            self.sampling.delays(&self.delay_margin_s),
+            stays_stable(document, &self.margins, Some(&delays))
         )
     }
 
