@@ -12,8 +12,8 @@ use certune::certify::FamilyValues;
 use certune::closed_loop::{FileError, Gains, GainsFile, KeyError};
 use certune::control::mrac::MracGains;
 use certune::dynamics::Robot;
-use certune::verify::{Certificate, ClaimKind, Rejection, VerifyError};
-use certune::{ArmCertifier, StabilityError, certificate_text};
+use certune::verify::{Certificate, ClaimKind, Record, Rejection, VerifyError, verify};
+use certune::{Answer, ArmCertifier, StabilityError, certificate_text};
 
 /// Why a claim could not be derived or compared.
 #[derive(Debug, thiserror::Error)]
@@ -38,6 +38,9 @@ pub enum ProofError {
         /// The failure.
         source: std::io::Error,
     },
+    /// A record of constants cannot be written.
+    #[error("a record of constants cannot be written: {0}")]
+    Record(#[from] serde_json::Error),
     /// The stored certificate cannot be read.
     #[error(transparent)]
     Unreadable(#[from] VerifyError),
@@ -55,6 +58,14 @@ pub fn nominal_family(gravity_compensation: bool, friction_n_m_s_per_rad: [f64; 
         payload_kg: [0.0, 0.0],
         rotor_inertia_kg_m2: [0.0, 0.0],
     }
+}
+
+/// The proved constants of the nominal Panda over all angles.
+///
+/// # Errors
+/// [`ProofError`] when the file is broken.
+pub fn records() -> Result<Vec<Record>, ProofError> {
+    Ok(vec![Record::parse(include_str!("../../tuning/constants/panda.json"))??])
 }
 
 /// The claims about the gains of the authors' released simulation, derived now.
@@ -103,5 +114,30 @@ pub fn stored(name: &str, derived: &Certificate) -> Result<Certificate, ProofErr
         std::fs::write(&path, certificate_text(derived)?).map_err(failed)?;
     }
     let text = std::fs::read_to_string(&path).map_err(failed)?;
-    Ok(certune::verify::verify(&text, &[])??)
+    Ok(verify(&text, &[])??)
+}
+
+/// The stored certificate of a claim that rests on a record of its own, checked with the stored record, `constants/<name>.json`; both are written first when
+/// `CERTUNE_WRITE_CLAIMS` is set.
+///
+/// # Errors
+/// As [`stored`].
+pub fn stored_with_record(name: &str, derived: &Answer) -> Result<(Certificate, Record), ProofError> {
+    let file = |folder| Path::new(env!("CARGO_MANIFEST_DIR")).join(folder).join(name).with_extension("json");
+    let [certificate, constants] = ["certificates", "constants"].map(file);
+    let failed = |path: &Path| {
+        let path = path.to_path_buf();
+        |source| ProofError::Stored { path, source }
+    };
+    if std::env::var_os("CERTUNE_WRITE_CLAIMS").is_some() {
+        for record in &derived.records {
+            let text = serde_json::to_string_pretty(record)? + "\n";
+            std::fs::write(&constants, text).map_err(failed(&constants))?;
+        }
+        std::fs::write(&certificate, certificate_text(&derived.certificate)?).map_err(failed(&certificate))?;
+    }
+    let record = Record::parse(&std::fs::read_to_string(&constants).map_err(failed(&constants))?)??;
+    let text = std::fs::read_to_string(&certificate).map_err(failed(&certificate))?;
+    let checked = verify(&text, std::slice::from_ref(&record))??;
+    Ok((checked, record))
 }
