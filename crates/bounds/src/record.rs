@@ -11,16 +11,23 @@
 //! | `k_g_n_m_per_rad` | `polygons` | `pieces`, `part_pieces` |
 //! | `gravity_torque_n_m` | `polygons` | `pieces` |
 //! | `k_c_kg_m2` | `equispaced-angles` | `angles`, `part_angles` |
+//! | `inertia` | `enclosure` | `halvings`; `others_lower_rad`, `others_upper_rad` |
 //! | `m_lo_kg_m2`, `diagonal_kg_m2` lower, `k_r`, `k_m` | `riccati` | `candidate`, `metric` for k_m, `boxes` |
 //!
-//! Limits: no enclosure of the inertia matrix entry by entry (such a record is refused); one interval of rotor inertia for all joints, as in [`Ranges`].
+//! A record with an enclosure of the inertia matrix is about a box; its other bounds are proved over a set around it: all angles, or the box that
+//! the enclosure's proof names.
+//!
+//! Limits: one interval of rotor inertia for all joints, as in [`Ranges`]; a record that was narrowed to fewer arms is derived for those, and
+//! whether candidates made for more arms pass within the same boxes is seen only then.
 
 use std::collections::BTreeMap;
 
 use certune_dynamics::{Model, Robot, RobotError};
-use certune_verify::{Arm, ArmRanges, BoundProof, Bounds, ConfigurationSet, Number, Record};
+use certune_verify::{Arm, ArmRanges, BoundProof, Bounds, ConfigurationSet, InertiaEnclosure, Number, Record};
+use num_traits::Signed;
 
 use crate::arm_box::{ArmBox, Ranges};
+use crate::enclosure::enclosure;
 use crate::error::BoundsError;
 use crate::riccati::{RiccatiBounds, RiccatiPlan, riccati_bounds_with};
 use crate::rigorous::{AngleSet, PolygonBounds, PolygonPlan, polygon_bounds_with};
@@ -28,6 +35,13 @@ use crate::rigorous::{AngleSet, PolygonBounds, PolygonPlan, polygon_bounds_with}
 const POLYGONS: &str = "polygons";
 const ANGLES: &str = "equispaced-angles";
 const RICCATI: &str = "riccati";
+const ENCLOSURE: &str = "enclosure";
+const INERTIA: &str = "inertia";
+const HALVINGS: &str = "halvings";
+const OTHERS_LOWER: &str = "others_lower_rad";
+const OTHERS_UPPER: &str = "others_upper_rad";
+/// Pieces that an enclosure may take, as a power of 2.
+const MOST_CUTS: usize = 24;
 
 /// Why bounds make no record, or a record does not hold.
 #[derive(Debug, thiserror::Error)]
@@ -96,8 +110,7 @@ pub fn record<const N: usize>(
     Model::<N>::new(robot)?;
     let (plan, candidates) = (&polygons.plan, &riccati.plan);
     let boxes = ("boxes", vec![exact("boxes", candidates.budget as f64)?]);
-    let metric = ("metric", exacts("metric", &candidates.metric_kg_m2)?);
-    let proofs = vec![
+    let mut proofs = vec![
         proof("m_lo_kg_m2", RICCATI, [("candidate", exacts("m_lo", &[candidates.m_lo_kg_m2])?), boxes.clone()]),
         proof("m_hi_kg_m2", POLYGONS, [("pieces", counts(&plan.inertia_pieces)?)]),
         proof(
@@ -110,9 +123,11 @@ pub fn record<const N: usize>(
             ANGLES,
             [("angles", counts(&plan.coriolis_grid)?), ("part_angles", counts(&plan.coriolis_part_grid)?)],
         ),
-        proof("k_r", RICCATI, [("candidate", exacts("k_r", &candidates.k_joint)?), boxes.clone()]),
-        proof("k_m", RICCATI, [("candidate", exacts("k_m", &candidates.k_joint)?), metric, boxes.clone()]),
-        proof("diagonal_kg_m2", RICCATI, [("candidate", exacts("diagonal", &candidates.diagonal_lower_kg_m2)?), boxes]),
+        proof(
+            "diagonal_kg_m2",
+            RICCATI,
+            [("candidate", exacts("diagonal", &candidates.diagonal_lower_kg_m2)?), boxes.clone()],
+        ),
         proof(
             "diagonal_kg_m2",
             POLYGONS,
@@ -120,13 +135,19 @@ pub fn record<const N: usize>(
         ),
         proof("gravity_torque_n_m", POLYGONS, [("pieces", counts(&plan.torque_pieces)?)]),
     ];
+    if !candidates.k_joint.is_empty() {
+        let metric = ("metric", exacts("metric", &candidates.metric_kg_m2)?);
+        let candidate = ("candidate", exacts("k_r", &candidates.k_joint)?);
+        proofs.push(proof("k_r", RICCATI, [candidate.clone(), boxes.clone()]));
+        proofs.push(proof("k_m", RICCATI, [candidate, metric, boxes]));
+    }
     let bounds = Bounds {
         m_lo_kg_m2: below("m_lo_kg_m2", riccati.m_lo_kg_m2)?,
         m_hi_kg_m2: above("m_hi_kg_m2", polygons.m_hi_kg_m2)?,
         k_g_n_m_per_rad: above("k_g_n_m_per_rad", polygons.k_g_n_m_per_rad)?,
         k_c_kg_m2: above("k_c_kg_m2", polygons.k_c_kg_m2)?,
-        k_r: Some(above("k_r", riccati.k_r)?),
-        k_m: Some(above("k_m", riccati.k_m)?),
+        k_r: riccati.k_r.map(|k_r| above("k_r", k_r)).transpose()?,
+        k_m: riccati.k_m.map(|k_m| above("k_m", k_m)).transpose()?,
         diagonal_kg_m2: Some([
             all("diagonal_kg_m2", &riccati.diagonal_lower_kg_m2, below)?,
             all("diagonal_kg_m2", &polygons.diagonal_upper_kg_m2, above)?,
@@ -167,11 +188,14 @@ pub fn recheck<const N: usize>(
     if record.arm.sha256 != given || record.arm.joints != N {
         return Err(RecordError::OtherArm { recorded: record.arm.sha256.clone(), given });
     }
-    if record.bounds.inertia.is_some() {
-        return Err(RecordError::NotDerived { bound: "inertia" });
-    }
     let arms = ArmBox::<N>::new(&Model::new(robot)?, &ranges(&record.arms))?;
-    let set = angle_set(&record.over)?;
+    let set = match &record.bounds.inertia {
+        None => angle_set(&record.over)?,
+        Some(recorded) => {
+            encloses(record, &arms, recorded)?;
+            set_of_the_others(record)?
+        }
+    };
     let polygons = polygon_bounds_with(&arms, &set, &polygon_plan(record)?, &|share| progress(0.3 * share))?;
     let riccati = riccati_bounds_with(&arms, &set, &riccati_plan(record)?, &|share| progress(0.3 + 0.7 * share))?;
     let bounds = &record.bounds;
@@ -179,11 +203,10 @@ pub fn recheck<const N: usize>(
     no_smaller("k_g_n_m_per_rad", &bounds.k_g_n_m_per_rad, polygons.k_g_n_m_per_rad)?;
     no_smaller("k_c_kg_m2", &bounds.k_c_kg_m2, polygons.k_c_kg_m2)?;
     no_larger("m_lo_kg_m2", &bounds.m_lo_kg_m2, riccati.m_lo_kg_m2)?;
-    if let Some(k_r) = &bounds.k_r {
-        no_smaller("k_r", k_r, riccati.k_r)?;
-    }
-    if let Some(k_m) = &bounds.k_m {
-        no_smaller("k_m", k_m, riccati.k_m)?;
+    for (bound, recorded, derived) in [("k_r", &bounds.k_r, riccati.k_r), ("k_m", &bounds.k_m, riccati.k_m)] {
+        if let Some(recorded) = recorded {
+            no_smaller(bound, recorded, derived.ok_or(RecordError::NotDerived { bound })?)?;
+        }
     }
     if let Some([lower, upper]) = &bounds.diagonal_kg_m2 {
         each("diagonal_kg_m2", lower, &riccati.diagonal_lower_kg_m2, no_larger)?;
@@ -193,6 +216,70 @@ pub fn recheck<const N: usize>(
         each("gravity_torque_n_m", torque, &polygons.gravity_torque_n_m, no_smaller)?;
     }
     Ok(())
+}
+
+/// Whether the recorded enclosure holds every matrix of the one derived with the same halvings.
+fn encloses<const N: usize>(
+    record: &Record,
+    arms: &ArmBox<N>,
+    recorded: &InertiaEnclosure,
+) -> Result<(), RecordError> {
+    let AngleSet::Box { lower_rad, upper_rad } = angle_set::<N>(&record.over)? else {
+        return Err(RecordError::NotDerived { bound: INERTIA });
+    };
+    let halvings = match whole(record, INERTIA, ENCLOSURE, HALVINGS)?.as_slice() {
+        [halvings] if halvings * N <= MOST_CUTS => *halvings as u32,
+        _ => return Err(RecordError::Parameter { bound: INERTIA, method: ENCLOSURE, parameter: HALVINGS }),
+    };
+    let derived = enclosure(arms, &lower_rad, &upper_rad, halvings)?;
+    // What was derived holds for the shortest decimals of its numbers.
+    let decimal = |value| exact(INERTIA, value);
+    let length = |given: usize| BoundsError::Length { given, expected: N };
+    let (middles, radii) = (&recorded.midpoint_kg_m2, &recorded.radius_kg_m2);
+    for matrix in [middles, radii] {
+        if matrix.len() != N || matrix.iter().any(|row| row.len() != N) {
+            return Err(length(matrix.len()).into());
+        }
+    }
+    for i in 0..N {
+        for j in 0..N {
+            let middle = decimal(derived.midpoint_kg_m2[i][j])?;
+            let radius = decimal(derived.radius_kg_m2[i][j])?;
+            let reach = (middles[i][j].value() - middle.value()).abs() + radius.value();
+            if *radii[i][j].value() < reach {
+                let recorded = format!("{} +- {} in row {i}, column {j}", middles[i][j], radii[i][j]);
+                return Err(RecordError::Tighter { bound: INERTIA, recorded, derived: derived.midpoint_kg_m2[i][j] });
+            }
+        }
+    }
+    let coriolis = derived.coriolis_kg_m2;
+    if recorded.coriolis_kg_m2.value() < decimal(coriolis)?.value() {
+        let recorded = recorded.coriolis_kg_m2.to_string();
+        return Err(RecordError::Tighter { bound: "coriolis_kg_m2", recorded, derived: coriolis });
+    }
+    Ok(())
+}
+
+/// The set that the bounds beside an enclosure are proved over, around the box of the record.
+fn set_of_the_others<const N: usize>(record: &Record) -> Result<AngleSet<N>, RecordError> {
+    let ends = |name: &str| {
+        let proof = record.proofs.iter().find(|proof| proof.bound == INERTIA && proof.method == ENCLOSURE);
+        proof.and_then(|proof| proof.parameters.get(name)).cloned()
+    };
+    let (lower_rad, upper_rad) = match [OTHERS_LOWER, OTHERS_UPPER].map(ends) {
+        [None, None] => return Ok(AngleSet::AllAngles),
+        [Some(lower), Some(upper)] => (lower, upper),
+        _ => return Err(RecordError::Parameter { bound: INERTIA, method: ENCLOSURE, parameter: OTHERS_LOWER }),
+    };
+    let ConfigurationSet::Box { lower_rad: inner_lower, upper_rad: inner_upper } = &record.over else {
+        return Err(RecordError::NotDerived { bound: INERTIA });
+    };
+    let at_most =
+        |a: &[Number], b: &[Number]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.value() <= b.value());
+    if !(at_most(&lower_rad, inner_lower) && at_most(inner_upper, &upper_rad)) {
+        return Err(RecordError::Parameter { bound: INERTIA, method: ENCLOSURE, parameter: OTHERS_LOWER });
+    }
+    angle_set(&ConfigurationSet::Box { lower_rad, upper_rad })
 }
 
 fn proof<const K: usize>(bound: &str, method: &str, parameters: [(&str, Vec<Number>); K]) -> BoundProof {
@@ -344,11 +431,15 @@ fn riccati_plan(record: &Record) -> Result<RiccatiPlan, RecordError> {
         let numbers = parameter(record, bound, RICCATI, name)?;
         numbers.first().copied().ok_or(RecordError::Parameter { bound, method: RICCATI, parameter: name })
     };
+    let relative = record.bounds.k_r.is_some() || record.bounds.k_m.is_some();
+    let list = |bound: &'static str, name: &'static str| {
+        if relative { parameter(record, bound, RICCATI, name) } else { Ok(Vec::new()) }
+    };
     Ok(RiccatiPlan {
         m_lo_kg_m2: one("m_lo_kg_m2", "candidate")?,
         diagonal_lower_kg_m2: parameter(record, "diagonal_kg_m2", RICCATI, "candidate")?,
-        k_joint: parameter(record, "k_r", RICCATI, "candidate")?,
-        metric_kg_m2: parameter(record, "k_m", RICCATI, "metric")?,
+        k_joint: list("k_r", "candidate")?,
+        metric_kg_m2: list("k_m", "metric")?,
         budget: one("m_lo_kg_m2", "boxes")?.clamp(0.0, 1e15) as u64,
     })
 }

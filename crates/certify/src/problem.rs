@@ -230,6 +230,9 @@ pub enum ProblemError {
     },
 }
 
+/// The bound of a record that holds over a box alone.
+const INERTIA: &str = "inertia";
+
 /// A document without claims.
 #[derive(Clone, Debug)]
 pub struct Problem {
@@ -340,7 +343,8 @@ impl Problem {
 
     /// The same problem over a box of configurations where M is enclosed: what was known over all angles holds there too.
     ///
-    /// Proved constants become a record of the box that holds the enclosure as well.
+    /// The values must have been computed for the family's arms. Proved constants become a record of the box and of those arms that holds the
+    /// enclosure as well.
     ///
     /// # Errors
     /// [`ProblemError`] when a number cannot be written.
@@ -361,7 +365,7 @@ impl Problem {
                 }
             }
         }
-        constants.over = ConfigurationSet::Box { lower_rad, upper_rad };
+        let before = std::mem::replace(&mut constants.over, ConfigurationSet::Box { lower_rad, upper_rad });
         constants.bounds.inertia = Some(InertiaEnclosure {
             midpoint_kg_m2: matrix("midpoint_kg_m2", &values.midpoint_kg_m2)?,
             radius_kg_m2: matrix("radius_kg_m2", &values.radius_kg_m2)?,
@@ -369,14 +373,23 @@ impl Problem {
         });
         let halvings = vec![number("halvings", f64::from(values.halvings))?];
         for record in &mut self.records {
-            let mut proofs = record.proofs.clone();
-            proofs.push(BoundProof {
-                bound: "inertia".to_owned(),
-                method: "taylor-models".to_owned(),
-                parameters: BTreeMap::from([("halvings".to_owned(), halvings.clone())]),
-            });
+            let (earlier, mut proofs): (Vec<_>, Vec<_>) =
+                record.proofs.iter().cloned().partition(|proof| proof.bound == INERTIA);
+            // Every other bound is proved over the set it came from; nothing more is said when that is all angles.
+            let mut parameters = match (earlier.into_iter().next(), &before) {
+                (Some(proof), _) => proof.parameters,
+                (None, ConfigurationSet::AllAngles) => BTreeMap::new(),
+                (None, ConfigurationSet::Box { lower_rad, upper_rad }) => BTreeMap::from([
+                    ("others_lower_rad".to_owned(), lower_rad.clone()),
+                    ("others_upper_rad".to_owned(), upper_rad.clone()),
+                ]),
+            };
+            parameters.insert("halvings".to_owned(), halvings.clone());
+            proofs.push(BoundProof { bound: INERTIA.to_owned(), method: "enclosure".to_owned(), parameters });
+            // The arms are the family's: M was enclosed for those, and the record may know more of them.
+            let arms = self.document.family.arms.clone();
             let (over, bounds) = (constants.over.clone(), constants.bounds.clone());
-            *record = Record { over, bounds, proofs, ..record.clone() }.sealed();
+            *record = Record { arms, over, bounds, proofs, ..record.clone() }.sealed();
             constants.evidence = Evidence::Proved { record_sha256: record.sha256.clone() };
         }
         Ok(self)

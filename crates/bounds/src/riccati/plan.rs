@@ -13,6 +13,10 @@ use crate::arm_box::ArmBox;
 use crate::error::BoundsError;
 use crate::rigorous::{AngleSet, Effort};
 
+/// Tried when the loosest candidate of a ladder fails: the sample missed what the proof has to cover, or bounds over boxes are wide for this arm.
+const LOOSER: [f64; 2] = [10.0, 30.0];
+/// No k below this is tried, per rad: rounding would hide it.
+const LEAST_K: f64 = 1e-6;
 /// Half a turn, rounded up.
 const HALF_TURN: f64 = PI + 4.0 * f64::EPSILON;
 /// An end of an interval is moved outward by this, for decimals that an `f64` only approximates, rad.
@@ -28,9 +32,9 @@ pub struct RiccatiPlan {
     pub m_lo_kg_m2: f64,
     /// `M >= diag(..)`, kg m².
     pub diagonal_lower_kg_m2: Vec<f64>,
-    /// k of each joint, per rad; that of the first is 0 and not proved.
+    /// k of each joint, per rad; that of the first is 0 and not proved. Empty when no k was proved for some joint: then there is no k_r and no k_m.
     pub k_joint: Vec<f64>,
-    /// The diagonal below M that k_m rests on, kg m²; 0 where k_j is 0.
+    /// The diagonal below M that k_m rests on, kg m²; 0 where k_j is 0. As long as `k_joint`.
     pub metric_kg_m2: Vec<f64>,
     /// Boxes allowed for each proof.
     pub budget: u64,
@@ -180,15 +184,25 @@ impl<'a, const N: usize> Proving<'a, N> {
             }
             best = Some((inequality, std::mem::take(&mut self.covers)));
         }
+        for ratio in LOOSER {
+            if best.is_some() {
+                break;
+            }
+            let inequality = candidate(ratio);
+            self.covers.clear();
+            if self.prove(&inequality, budget, from, to).is_some() {
+                best = Some((inequality, std::mem::take(&mut self.covers)));
+            }
+        }
         self.covers = kept;
         let Some((inequality, sizes)) = best else {
-            return Err(not_proved(&candidate(ratios[0]), budget));
+            return Err(not_proved(&candidate(LOOSER[1]), budget));
         };
         self.covers.extend(sizes);
         Ok(inequality)
     }
 
-    /// Candidates from a sample, tightened.
+    /// Candidates from a sample, tightened. Only `m_lo` must succeed: it serves for a diagonal that fails, and a k that fails is left out.
     pub fn search(mut self, ladder: Ladder) -> Result<RiccatiBounds, BoundsError> {
         let guesses: Vec<Guess<N>> =
             self.arms.corner_models().iter().map(|model| Guess::new(model, &self.intervals)).collect();
@@ -214,40 +228,34 @@ impl<'a, const N: usize> Proving<'a, N> {
         })?;
         let (from, to) = next();
         let shape = light.diagonal(None);
-        let diagonal = self.tighten(ladder, from, to, |ratio| Inequality::Inertia {
+        let scaled = |shape: &[f64; N], ratio: f64| Inequality::Inertia {
             kg_m2: shape.iter().map(|x| plain(x / ratio, false)).collect(),
-        })?;
+        };
+        let diagonal = self.tighten(ladder, from, to, |ratio| scaled(&shape, ratio)).unwrap_or_else(|_| m_lo.clone());
         let mut k_joint = vec![0.0; N];
         for joint in 1..N {
             // A joint whose k is far below the others' need not be sharp.
             let (from, to) = next();
-            let floor = 0.02 * k.iter().copied().fold(0.0, f64::max);
+            let floor = 0.02 * k.iter().copied().fold(LEAST_K / 0.02, f64::max);
             let guess = k[joint].max(floor);
-            if k[joint] > 1e-9 {
-                let found = self.tighten(ladder, from, to, |ratio| Inequality::Coriolis {
-                    joint: joint + 1,
-                    k: plain(guess * ratio, true),
-                })?;
-                if let Inequality::Coriolis { k, .. } = found {
-                    k_joint[joint] = k;
-                }
-            } else {
-                let zero = Inequality::Coriolis { joint: joint + 1, k: 1e-6 };
-                let budget = ladder.budget;
-                self.prove(&zero, budget, from, to).ok_or_else(|| not_proved(&zero, budget))?;
-                k_joint[joint] = 1e-6;
-            }
+            let found = self.tighten(ladder, from, to, |ratio| Inequality::Coriolis {
+                joint: joint + 1,
+                k: plain(guess * ratio, true),
+            });
+            let Ok(Inequality::Coriolis { k, .. }) = found else {
+                k_joint.clear();
+                break;
+            };
+            k_joint[joint] = k;
         }
         let (from, to) = next();
-        let mut proved_k = [0.0; N];
-        proved_k.copy_from_slice(&k_joint);
-        let shape = light.diagonal(Some(&proved_k));
-        let metric = if N > 1 {
-            self.tighten(ladder, from, to, |ratio| Inequality::Inertia {
-                kg_m2: shape.iter().map(|x| plain(x / ratio, false)).collect(),
-            })?
-        } else {
-            Inequality::Inertia { kg_m2: vec![0.0; N] }
+        let metric = match <[f64; N]>::try_from(k_joint.as_slice()) {
+            Err(_) => Inequality::Inertia { kg_m2: Vec::new() },
+            Ok(_) if N == 1 => Inequality::Inertia { kg_m2: vec![0.0; N] },
+            Ok(proved_k) => {
+                let shape = light.diagonal(Some(&proved_k));
+                self.tighten(ladder, from, to, |ratio| scaled(&shape, ratio)).unwrap_or_else(|_| m_lo.clone())
+            }
         };
         let plan = RiccatiPlan {
             m_lo_kg_m2: first(&m_lo),
@@ -261,9 +269,12 @@ impl<'a, const N: usize> Proving<'a, N> {
 
     /// A plan from before.
     pub fn follow(mut self, plan: &RiccatiPlan) -> Result<RiccatiBounds, BoundsError> {
-        for length in [plan.diagonal_lower_kg_m2.len(), plan.k_joint.len(), plan.metric_kg_m2.len()] {
-            if length != N {
-                return Err(BoundsError::Length { given: length, expected: N });
+        let joints_of_k = if plan.k_joint.is_empty() { 0 } else { N };
+        for (list, expected) in
+            [(&plan.diagonal_lower_kg_m2, N), (&plan.k_joint, joints_of_k), (&plan.metric_kg_m2, joints_of_k)]
+        {
+            if list.len() != expected {
+                return Err(BoundsError::Length { given: list.len(), expected });
             }
         }
         plan.check()?;
@@ -271,8 +282,8 @@ impl<'a, const N: usize> Proving<'a, N> {
             Inequality::Inertia { kg_m2: vec![plan.m_lo_kg_m2; N] },
             Inequality::Inertia { kg_m2: plan.diagonal_lower_kg_m2.clone() },
         ];
-        wanted.extend((1..N).map(|joint| Inequality::Coriolis { joint: joint + 1, k: plan.k_joint[joint] }));
-        if N > 1 {
+        wanted.extend(plan.k_joint.iter().enumerate().skip(1).map(|(j, k)| Inequality::Coriolis { joint: j + 1, k: *k }));
+        if joints_of_k > 1 {
             wanted.push(Inequality::Inertia { kg_m2: plan.metric_kg_m2.clone() });
         }
         #[expect(clippy::cast_precision_loss, reason = "a handful of inequalities")]
@@ -288,6 +299,7 @@ impl<'a, const N: usize> Proving<'a, N> {
     fn finish(self, plan: RiccatiPlan) -> RiccatiBounds {
         (self.progress)(1.0);
         let up = 1.0 + 1e-13;
+        let known = !plan.k_joint.is_empty();
         let k_r = plan.k_joint.iter().map(|k| k * k).sum::<f64>().sqrt() * up;
         let terms = plan.k_joint.iter().zip(&plan.metric_kg_m2).filter(|(k, _)| **k != 0.0).map(|(k, e)| k * k / e);
         let k_m = terms.sum::<f64>().sqrt() * up;
@@ -295,8 +307,8 @@ impl<'a, const N: usize> Proving<'a, N> {
             m_lo_kg_m2: plan.m_lo_kg_m2,
             diagonal_lower_kg_m2: plan.diagonal_lower_kg_m2.clone(),
             k_joint: plan.k_joint.clone(),
-            k_r,
-            k_m,
+            k_r: known.then_some(k_r),
+            k_m: known.then_some(k_m),
             plan,
             covers: self.covers,
         }
