@@ -183,7 +183,7 @@ fn coriolis_bound<const N: usize>(slopes: &[JointMatrix<N, Affine<N>>; N]) -> f6
     }
     let at = |i: usize, j: usize, k: usize| middle[(i * N + j) * N + k];
     let flattenings: [JointMatrix<N, Interval>; 3] =
-        [gram(|row, a, b| at(row, a, b)), gram(|row, a, b| at(a, row, b)), gram(|row, a, b| at(a, b, row))];
+        [gram(at), gram(|row, a, b| at(a, row, b)), gram(|row, a, b| at(a, b, row))];
     let norm = flattenings.into_iter().map(largest_singular_value).fold(f64::INFINITY, f64::min);
     (Interval::from_f64(norm) + squares.sqrt()).upper()
 }
