@@ -101,6 +101,9 @@ pub fn certify(
     attain: &Attain<'_>,
 ) -> Result<Certificate, CertifyError> {
     let mut document = problem.document().clone();
+    // The search knows no box of angles: what it finds outside is no arm of the document.
+    let over = &problem.document().constants.over;
+    let attain: &Attain<'_> = &|timing| attain(timing).filter(|(_, attained)| over.contains(&attained.q_rad));
     for kind in claims {
         let made = match kind {
             ClaimKind::Exponential => vec![exponential(problem, attain)],

@@ -106,6 +106,20 @@ pub enum ConfigurationSet {
     },
 }
 
+impl ConfigurationSet {
+    /// Whether the set holds a configuration.
+    pub fn contains(&self, q_rad: &[Number]) -> bool {
+        match self {
+            Self::AllAngles => true,
+            Self::Box { lower_rad, upper_rad } => q_rad
+                .iter()
+                .zip(lower_rad)
+                .zip(upper_rad)
+                .all(|((angle, lower), upper)| lower.value() <= angle.value() && angle.value() <= upper.value()),
+        }
+    }
+}
+
 /// Numbers that bound an arm, for all `y`, `v` and every configuration of a set. `|x|_M^2 = x'M x`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

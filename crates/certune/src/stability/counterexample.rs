@@ -33,11 +33,8 @@ impl<const N: usize> ArmCertifier<N> {
         }
         // Angles that a person can type, if the loop is unstable there as well.
         let mut short = top.at.clone();
-        for (angle, axis) in short[..N].iter_mut().zip(&axes) {
+        for angle in &mut short[..N] {
             *angle = (*angle * 1e3).round() / 1e3;
-            if let Axis::Interval { lower, upper } = axis {
-                *angle = angle.clamp(*lower, *upper);
-            }
         }
         let at = if score(&short) > 0.0 { short } else { top.at };
         let (member, worst) = self.member_loop(&time, &at)?;
