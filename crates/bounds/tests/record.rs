@@ -142,11 +142,7 @@ fn an_enclosure_is_derived_over_its_own_box() {
         radius_kg_m2: rows(&found.radius_kg_m2),
         coriolis_kg_m2: number(found.coriolis_kg_m2),
     });
-    let parameters = [
-        ("halvings", numbers(&[1.0])),
-        ("others_lower_rad", lower_rad),
-        ("others_upper_rad", upper_rad),
-    ];
+    let parameters = [("halvings", numbers(&[1.0])), ("others_lower_rad", lower_rad), ("others_upper_rad", upper_rad)];
     narrow.proofs.push(BoundProof {
         bound: "inertia".to_owned(),
         method: "enclosure".to_owned(),
