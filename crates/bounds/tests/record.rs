@@ -150,7 +150,8 @@ fn an_enclosure_is_derived_over_its_own_box() {
     });
     recheck::<2>(&narrow.clone().sealed(), &robot, &silent).unwrap();
 
-    let refused = |edit: &dyn Fn(&mut InertiaEnclosure, &mut Vec<Number>, &mut Vec<Number>)| {
+    type Edit<'a> = &'a dyn Fn(&mut InertiaEnclosure, &mut Vec<Number>, &mut Vec<Number>);
+    let refused = |edit: Edit| {
         let mut edited = narrow.clone();
         let (Some(inertia), ConfigurationSet::Box { upper_rad, .. }, Some(proof)) =
             (&mut edited.bounds.inertia, &mut edited.over, edited.proofs.last_mut())
