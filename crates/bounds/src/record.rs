@@ -219,11 +219,7 @@ pub fn recheck<const N: usize>(
 }
 
 /// Whether the recorded enclosure holds every matrix of the one derived with the same halvings.
-fn encloses<const N: usize>(
-    record: &Record,
-    arms: &ArmBox<N>,
-    recorded: &InertiaEnclosure,
-) -> Result<(), RecordError> {
+fn encloses<const N: usize>(record: &Record, arms: &ArmBox<N>, recorded: &InertiaEnclosure) -> Result<(), RecordError> {
     let AngleSet::Box { lower_rad, upper_rad } = angle_set::<N>(&record.over)? else {
         return Err(RecordError::NotDerived { bound: INERTIA });
     };

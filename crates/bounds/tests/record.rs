@@ -142,11 +142,7 @@ fn an_enclosure_is_derived_over_its_own_box() {
         radius_kg_m2: rows(&found.radius_kg_m2),
         coriolis_kg_m2: number(found.coriolis_kg_m2),
     });
-    let parameters = [
-        ("halvings", numbers(&[1.0])),
-        ("others_lower_rad", lower_rad),
-        ("others_upper_rad", upper_rad),
-    ];
+    let parameters = [("halvings", numbers(&[1.0])), ("others_lower_rad", lower_rad), ("others_upper_rad", upper_rad)];
     narrow.proofs.push(BoundProof {
         bound: "inertia".to_owned(),
         method: "enclosure".to_owned(),
@@ -154,7 +150,8 @@ fn an_enclosure_is_derived_over_its_own_box() {
     });
     recheck::<2>(&narrow.clone().sealed(), &robot, &silent).unwrap();
 
-    let refused = |edit: &dyn Fn(&mut InertiaEnclosure, &mut Vec<Number>, &mut Vec<Number>)| {
+    type Edit<'a> = &'a dyn Fn(&mut InertiaEnclosure, &mut Vec<Number>, &mut Vec<Number>);
+    let refused = |edit: Edit| {
         let mut edited = narrow.clone();
         let (Some(inertia), ConfigurationSet::Box { upper_rad, .. }, Some(proof)) =
             (&mut edited.bounds.inertia, &mut edited.over, edited.proofs.last_mut())

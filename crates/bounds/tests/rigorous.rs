@@ -162,7 +162,9 @@ fn quick(ranges: &Ranges) -> (ArmBox<7>, PolygonBounds) {
     (arms, bounds)
 }
 
+// `cargo test --release -p certune-bounds -- --ignored` runs this and the other slow ones.
 #[test]
+#[ignore = "20 s of two cores; `any_arm_with_uncertain_masses_obeys_its_bounds` attacks smaller arms"]
 fn no_member_of_a_family_exceeds_its_bounds() {
     for (ranges, seed) in families().iter().zip(1..) {
         let (arms, bounds) = quick(ranges);

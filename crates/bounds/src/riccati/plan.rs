@@ -43,7 +43,8 @@ pub struct RiccatiPlan {
 impl RiccatiPlan {
     /// What is proved is about `|k_j|` and diagonals below M; what follows from it divides by the latter, so signs matter.
     fn check(&self) -> Result<(), BoundsError> {
-        let refused = |parameter, joint: usize, value| Err(BoundsError::Candidate { parameter, joint: joint + 1, value });
+        let refused =
+            |parameter, joint: usize, value| Err(BoundsError::Candidate { parameter, joint: joint + 1, value });
         let lists = [
             ("m_lo", std::slice::from_ref(&self.m_lo_kg_m2)),
             ("diagonal", self.diagonal_lower_kg_m2.as_slice()),
@@ -282,7 +283,8 @@ impl<'a, const N: usize> Proving<'a, N> {
             Inequality::Inertia { kg_m2: vec![plan.m_lo_kg_m2; N] },
             Inequality::Inertia { kg_m2: plan.diagonal_lower_kg_m2.clone() },
         ];
-        wanted.extend(plan.k_joint.iter().enumerate().skip(1).map(|(j, k)| Inequality::Coriolis { joint: j + 1, k: *k }));
+        wanted
+            .extend(plan.k_joint.iter().enumerate().skip(1).map(|(j, k)| Inequality::Coriolis { joint: j + 1, k: *k }));
         if joints_of_k > 1 {
             wanted.push(Inequality::Inertia { kg_m2: plan.metric_kg_m2.clone() });
         }

@@ -411,7 +411,7 @@ fn bounds_of_the_panda_over_the_task_hold_are_tight_and_are_found_again() {
     // True values from another program, by local maximisation.
     assert!(found.m_lo_kg_m2 <= 0.0048 && found.m_lo_kg_m2 >= 0.0035, "{}", found.m_lo_kg_m2);
     let k_r = found.k_r.unwrap();
-    assert!(k_r >= 4.662 && k_r <= 1.3 * 4.662, "{k_r}");
+    assert!((4.662..=1.3 * 4.662).contains(&k_r), "{k_r}");
     let again = riccati_bounds_with(&arms, &task_box(), &found.plan, &|_| {}).unwrap();
     assert_eq!(found, again);
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
