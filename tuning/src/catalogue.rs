@@ -38,8 +38,10 @@ pub const SCENARIOS: [(&str, &str); 6] = [
 pub const SPACES: [(&str, &str); 1] = [("panda-aic", include_str!("../spaces/panda-aic.toml"))];
 
 /// Proved constants, each record of one robot over one set of configurations.
-pub const CONSTANTS: [(&str, &str); 2] = [
+pub const CONSTANTS: [(&str, &str); 4] = [
     ("panda", include_str!("../constants/panda.json")),
+    ("panda-masses-payload-rotor", include_str!("../constants/panda-masses-payload-rotor.json")),
+    ("panda-payload-3", include_str!("../constants/panda-payload-3.json")),
     ("panda-rotor-0.1", include_str!("../constants/panda-rotor-0.1.json")),
 ];
 
