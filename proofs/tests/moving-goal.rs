@@ -2,12 +2,12 @@
 //! that speed.
 #![expect(clippy::panic, clippy::unwrap_used, reason = "test helpers")]
 
-use certune::certify::{GoalListValues, MovingGoalOptions, Options};
+use certune::certify::{FamilyValues, GoalListValues, MovingGoalOptions, Options};
 use certune::closed_loop::Scenario;
 use certune::control::aic::AicGains;
-use certune::verify::{Certificate, Claim, ClaimKind, Document, MovingGoalClaim, Number, seal, verify};
-use certune::{Effort, certificate_text};
-use proofs::{grade, nominal_family, panda, records, stored};
+use certune::verify::{Certificate, Claim, ClaimKind, Document, Grade, MovingGoalClaim, Number, seal, verify};
+use certune::{Effort, Request, TorqueLimits, certificate_text};
+use proofs::{grade, kept, nominal_family, panda, records, stored};
 
 fn pick_and_place() -> GoalListValues {
     let text = include_str!("../../tuning/scenarios/pick-and-place-ramped.toml");
@@ -39,6 +39,51 @@ fn claim(document: &Document) -> &MovingGoalClaim {
         Claim::MovingGoal(claim) => claim,
         other => panic!("{other:?}"),
     }
+}
+
+/// Gains that were re-tuned for a slow ramp: a weaker torque and slower beliefs, the same on every joint.
+fn derive_sampled() -> Certificate {
+    let gains = AicGains::<7> {
+        kappa_mu: [11.67; 7],
+        kappa_a: [200.0; 7],
+        sigma_q: [1.0; 7],
+        sigma_dq: [1.0; 7],
+        sigma_mu: [15.0; 7],
+        sigma_dmu: [30.0; 7],
+        reference_time_constant_s: [1.0; 7],
+    };
+    // The task's order, each goal standing as long as its slow ramp needs.
+    let GoalListValues { start_rad, goals } = pick_and_place();
+    let goals = goals.into_iter().map(|(goal, duration)| (goal, if duration > 10.0 { 72.0 } else { 45.0 })).collect();
+    let request = Request {
+        claims: vec![ClaimKind::MovingGoal],
+        delay_samples: Some(1),
+        torque_limits: TorqueLimits::LessGravity,
+        goals: Some(GoalListValues { start_rad, goals }),
+        ..Request::default()
+    };
+    let family = FamilyValues { rotor_inertia_kg_m2: [0.1; 2], ..nominal_family(true, [1.0, 1.0]) };
+    panda(&family).unwrap().answer(&gains.into(), &request).unwrap().certificate
+}
+
+/// At 1 kHz, one sample late, every motor within its limit. Deriving it takes half a minute of a core: `cargo xtask claims` does.
+#[test]
+fn a_slow_ramp_is_covered_when_sampled_and_late_with_every_torque_limit_kept() {
+    let certificate = if std::env::var_os("CERTUNE_WRITE_CLAIMS").is_some() {
+        stored("moving-goal--sampled", &derive_sampled()).unwrap()
+    } else {
+        kept("moving-goal--sampled").unwrap()
+    };
+    assert!(certificate.all_hold());
+    assert!(certificate.checked().iter().all(|checked| checked.grade == Some(Grade::Proved)));
+    let Claim::SampledRegion(region) = &certificate.document().claims[0].claim else { panic!("no sampled region") };
+    assert_eq!(region.sampling.delay_samples, 1);
+    // The weakest motor has 12 N m, gravity takes its share of that.
+    assert!(region.sampling.torque_limit_n_m.as_ref().unwrap().to_f64() <= 12.0);
+    let claim = claim(certificate.document());
+    assert!(claim.goal_speed_rad_per_s.to_f64() >= 0.05, "{}", claim.goal_speed_rad_per_s);
+    let list = claim.list.as_ref().unwrap();
+    assert!(list.goals.len() == 5 && list.goals.iter().all(|goal| goal.arrival_s.value() <= goal.duration_s.value()));
 }
 
 #[test]
