@@ -1,6 +1,6 @@
 //! The program as its users meet it: command lines in, text, files and exit codes out.
 
-#![expect(clippy::unwrap_used, reason = "a test stops at the first surprise")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "a test stops at the first surprise")]
 
 mod bad_input;
 mod commands;
