@@ -121,13 +121,13 @@ fn what_certify_writes_verify_accepts() {
     let exponential = "certify --robot panda --gains pezzato2020-simulation --claim exponential --out a.json";
     let made = json(folder.path(), exponential, 0);
     assert!(figure(&made["claims"][0], "rate") >= 0.7);
-    assert_eq!(made["claims"][0]["grade"], "conditional");
+    assert_eq!(made["claims"][0]["grade"], "proved");
     let region =
         "certify --robot panda --gains pezzato2020-simulation --claim region --gravity-compensation on --out b.json";
     let without = json(folder.path(), region, 0);
-    assert!(figure(&without["claims"][0], "radius") >= 0.33);
+    assert!(figure(&without["claims"][0], "radius") >= 0.20);
     let with = json(folder.path(), &format!("{region} --friction 1..3"), 0);
-    assert!(figure(&with["claims"][0], "radius") >= 0.80);
+    assert!(figure(&with["claims"][0], "radius") >= 0.65);
     let checked = json(folder.path(), "verify a.json b.json", 0);
     assert_eq!(checked[0]["verdict"], "holds");
     assert_eq!(checked[0]["sha256"], made["sha256"]);
@@ -174,7 +174,7 @@ fn gains_of_each_joint_and_adaptive_gains_have_claims_of_their_own() {
     let joints = "certify --robot panda --gains pezzato2020-robot --gravity-compensation on --friction 1..3 --claim joint-region";
     let made = json(folder.path(), joints, 0);
     assert_eq!(kinds(&made), ["joint-region"]);
-    assert_eq!(made["claims"][0]["grade"], "conditional");
+    assert_eq!(made["claims"][0]["grade"], "proved");
 
     let adaptive = "certify --robot panda --gains pezzato2020-mrac-simulation --gravity-compensation on";
     let released = json(folder.path(), adaptive, 2);
@@ -270,5 +270,5 @@ fn the_recorded_certificate_verifies() {
     let folder = tempfile::tempdir().unwrap();
     let recorded = concat!(env!("CARGO_MANIFEST_DIR"), "/results/panda-aic-1/certificate.json");
     let checked = stdout(folder.path(), &format!("verify {recorded}"), 0);
-    assert!(checked.contains("exponential: holds (conditional)") && checked.contains("region: holds (conditional)"));
+    assert!(checked.contains("exponential: holds (proved)") && checked.contains("region: holds (proved)"));
 }
