@@ -133,7 +133,7 @@ fn what_certify_writes_verify_accepts() {
     assert_eq!(checked[0]["sha256"], made["sha256"]);
     assert!(checked[1]["claims"][0]["inequalities"][0]["smallest_pivot"].as_f64().unwrap() > 0.0);
     let words = stdout(folder.path(), "verify b.json", 0);
-    assert!(words.contains("region: holds (conditional)") && words.contains("assumptions") && words.contains("pivot"));
+    assert!(words.contains("region: holds (proved)") && words.contains("assumptions") && words.contains("pivot"));
 }
 
 #[test]
