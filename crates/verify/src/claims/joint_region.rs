@@ -250,7 +250,8 @@ impl JointRegionClaim {
 
     /// Whether the claim's own numbers are what the proof allows.
     fn check(&self, document: &Document) -> Result<(), Flaw> {
-        let joints = document.arm.joints;
+        // Not the number written: a sentence is made of files that nothing has checked yet.
+        let joints = document.family.friction_n_m_s_per_rad.len();
         require_length("radii_rad", self.radii_rad.len(), joints)?;
         require_length("joints", self.witness.joints.len(), joints)?;
         require_positive("rate_per_s", &self.rate_per_s)?;

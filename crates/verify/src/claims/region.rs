@@ -232,7 +232,8 @@ impl RegionClaim {
                 )?;
             }
         }
-        let joints = document.arm.joints;
+        // Not the number written: a sentence is made of files that nothing has checked yet.
+        let joints = document.family.friction_n_m_s_per_rad.len();
         require_inside(document, &vec![self.distance_rad.clone(); joints])?;
         let witness = &self.witness;
         // A witness is only ever computed with: dyadics of any size will do.
@@ -258,7 +259,8 @@ impl RegionClaim {
 
 impl Normed for RegionClaim {
     fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
-        let joints = document.arm.joints;
+        // Not the number written: a sentence is made of files that nothing has checked yet.
+        let joints = document.family.friction_n_m_s_per_rad.len();
         Ok(Norm {
             shift_weights: vec![self.start_weight(document)?; joints],
             rate: self.rate_per_s.value().clone(),
