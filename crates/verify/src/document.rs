@@ -56,6 +56,12 @@ pub struct Family {
 }
 
 impl Family {
+    /// How many joints the family gives numbers for. The number written beside the arm's name is compared with it before anything is
+    /// proved; in a file that nothing has checked yet it could ask for any amount of memory.
+    pub(crate) fn joints(&self) -> usize {
+        self.friction_n_m_s_per_rad.len()
+    }
+
     /// Least and largest viscous friction of any joint, N m s/rad; zero for a family without joints.
     pub fn friction_hull(&self) -> [Number; 2] {
         let joints = &self.friction_n_m_s_per_rad;

@@ -104,7 +104,7 @@ impl Provable for AdaptiveSampledClaim {
         }
         let [limit, _] = limits(self.delay_samples)?;
         let bounds = &document.constants.bounds;
-        let uniform = vec![bounds.m_lo_kg_m2.clone(); document.family.friction_n_m_s_per_rad.len()];
+        let uniform = vec![bounds.m_lo_kg_m2.clone(); document.family.joints()];
         let below = bounds.diagonal_kg_m2.as_ref().map(|[lower, _]| lower.clone());
         let check = |lower: &[Number]| -> Vec<Inequality> {
             reach

@@ -151,7 +151,7 @@ pub fn disturbance_inequalities(document: &Document, claim: &DisturbanceClaim) -
     let arm = DisturbedArm::new(document, claim)?;
     check(claim)?;
     // Constants over a box of angles serve only a motion that stays in it.
-    require_inside(document, &vec![Some(claim.excursion_rad.clone()); document.family.friction_n_m_s_per_rad.len()])?;
+    require_inside(document, &vec![Some(claim.excursion_rad.clone()); document.family.joints()])?;
     let point = claim.witness.point(&arm.region.plant)?;
     let shares = claim.witness.disturbance_shares.each_ref().map(|x| x.value().clone());
     let excursion = claim.excursion_rad.value();

@@ -31,7 +31,7 @@ use num_traits::Signed;
 use serde::{Deserialize, Serialize};
 
 use super::energy::{Energy, Plant, Point, Quantities, State};
-use super::region::{controller_share, goal_inside, require_compensation, require_inside, scope};
+use super::region::{controller_share, goal_inside, require_compensation, require_inside, scope, starting_torque};
 use super::{ClaimKind, Figure, Inequality, Provable, all_hold};
 use crate::aic::STATES;
 use crate::document::Document;
@@ -109,11 +109,7 @@ impl Provable for JointRegionClaim {
     }
 
     fn sentence(&self, document: &Document) -> String {
-        let torque = if document.family.gravity_compensation {
-            "with zero controller torque"
-        } else {
-            "with the controller's torque holding gravity there"
-        };
+        let torque = starting_torque(document);
         let mut text = format!(
             "from rest at any configuration with sum_i ((q_i - goal_i)/r_i)^2 <= 1 around a constant goal, r = {} rad (angles not wrapped){}, beliefs \
              at the measurement (mu = q, mu' = mu'' = 0), {torque}, the nonlinear loop converges to the goal, and the Lyapunov function of the \
@@ -250,8 +246,7 @@ impl JointRegionClaim {
 
     /// Whether the claim's own numbers are what the proof allows.
     fn check(&self, document: &Document) -> Result<(), Flaw> {
-        // Not the number written: a sentence is made of files that nothing has checked yet.
-        let joints = document.family.friction_n_m_s_per_rad.len();
+        let joints = document.family.joints();
         require_length("radii_rad", self.radii_rad.len(), joints)?;
         require_length("joints", self.witness.joints.len(), joints)?;
         require_positive("rate_per_s", &self.rate_per_s)?;

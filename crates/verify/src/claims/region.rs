@@ -87,11 +87,7 @@ impl Provable for RegionClaim {
     }
 
     fn sentence(&self, document: &Document) -> String {
-        let torque = if document.family.gravity_compensation {
-            "with zero controller torque"
-        } else {
-            "with the controller's torque holding gravity there"
-        };
+        let torque = starting_torque(document);
         let mut text = format!(
             "from rest at any configuration within {} rad of a constant goal (2-norm over the joints, angles not wrapped){}, beliefs at the \
              measurement (mu = q, mu' = mu'' = 0), {torque}, the nonlinear loop converges to the goal, and the Lyapunov function of the \
@@ -146,6 +142,15 @@ pub(crate) fn goal_inside(document: &Document, distance: Option<String>) -> Stri
             format!(", the goal at least {distance} rad inside the angles the constants hold for")
         }
         (ConfigurationSet::Box { .. } | ConfigurationSet::AllAngles, _) => String::new(),
+    }
+}
+
+/// The controller's torque at the start, in words.
+pub(crate) fn starting_torque(document: &Document) -> &'static str {
+    if document.family.gravity_compensation {
+        "with zero controller torque"
+    } else {
+        "with the controller's torque holding gravity there"
     }
 }
 
@@ -232,8 +237,7 @@ impl RegionClaim {
                 )?;
             }
         }
-        // Not the number written: a sentence is made of files that nothing has checked yet.
-        let joints = document.family.friction_n_m_s_per_rad.len();
+        let joints = document.family.joints();
         require_inside(document, &vec![self.distance_rad.clone(); joints])?;
         let witness = &self.witness;
         // A witness is only ever computed with: dyadics of any size will do.
@@ -259,8 +263,7 @@ impl RegionClaim {
 
 impl Normed for RegionClaim {
     fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
-        // Not the number written: a sentence is made of files that nothing has checked yet.
-        let joints = document.family.friction_n_m_s_per_rad.len();
+        let joints = document.family.joints();
         Ok(Norm {
             shift_weights: vec![self.start_weight(document)?; joints],
             rate: self.rate_per_s.value().clone(),

@@ -184,7 +184,7 @@ impl Provable for SampledRegionClaim {
 impl Normed for SampledRegionClaim {
     fn norm(&self, document: &Document) -> Result<Norm, Flaw> {
         Ok(Norm {
-            shift_weights: vec![self.goal_step_weight()?; document.family.friction_n_m_s_per_rad.len()],
+            shift_weights: vec![self.goal_step_weight()?; document.family.joints()],
             rate: self.sampling.rate_per_s.value().clone(),
             period: Some(self.sampling.step_s.value().clone()),
             kept: None,
