@@ -16,7 +16,7 @@ use crate::digits::{above, readable};
 use crate::lmi::{Affine, Program};
 use crate::not_proved;
 use crate::problem::Problem;
-use crate::region::{scaled, strict};
+use crate::region::{STRICTNESS, scaled, strict};
 
 /// What disturbs the loop, and where it starts. All norms are 2-norms over the joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,8 +56,6 @@ const START: usize = SHARES + 3;
 const CLOSENESS: usize = START + 4;
 const VARIABLES: usize = CLOSENESS + 1;
 
-/// Margins by which the inequalities are tightened, in turn.
-const STRICTNESS: [f64; 4] = [1e-7, 1e-6, 1e-5, 1e-4];
 /// Where rate (1/s), rho and level are searched, with the points of the coarse grid.
 const RATES: ([f64; 2], usize) = ([0.02, 2.0], 4);
 const RHO: ([f64; 2], usize) = ([0.005, 10.0], 6);

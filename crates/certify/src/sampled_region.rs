@@ -14,6 +14,7 @@ use num_rational::BigRational;
 
 use crate::lmi::{Affine, Program};
 use crate::problem::Problem;
+use crate::region::STRICTNESS;
 
 /// How a sampled region is searched.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,8 +47,6 @@ impl Default for SampledRegionOptions {
     }
 }
 
-/// Margins by which the inequalities are tightened, in turn.
-const STRICTNESS: [f64; 4] = [1e-7, 1e-6, 1e-5, 1e-4];
 /// Where `rho` and `speed` are searched first.
 const RHO: [f64; 3] = [0.04, 0.12, 0.36];
 const SPEED: [f64; 3] = [0.005, 0.01, 0.02];
