@@ -43,27 +43,7 @@ pub(crate) fn axis(order: usize) -> usize {
 
 /// `J B - B J`, the derivative of `Z(d)' B Z(d)` at 0; exact but for at most three roundings of an entry.
 fn derivative(b: &Matrix) -> Matrix {
-    let mut out = ZERO;
-    for i in 0..ORDER {
-        for j in 0..ORDER {
-            let left = match i {
-                0 => -b[1][j],
-                1 => b[0][j],
-                3 => -b[4][j],
-                4 => b[3][j],
-                _ => 0.0,
-            };
-            let right = match j {
-                0 => b[i][1],
-                1 => -b[i][0],
-                3 => b[i][4],
-                4 => -b[i][3],
-                _ => 0.0,
-            };
-            out[i][j] = left - right;
-        }
-    }
-    out
+    one_side(b).map(|row| row.map(|entry| -entry))
 }
 
 /// [`derivative`] of a ball.
