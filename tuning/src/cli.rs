@@ -147,6 +147,20 @@ pub enum Switch {
     Off,
 }
 
+/// Which arms, around the robot's nominal one.
+#[derive(Debug, Args)]
+pub struct ArmsArgs {
+    /// Payload from 0 to this mass, kg; a point held at the grasp point [default: 0]
+    #[arg(long, value_name = "KG", value_parser = non_negative, allow_hyphen_values = true)]
+    pub payload: Option<f64>,
+    /// Link masses differ from nominal by up to this share, 0.2 for ±20 % [default: 0]
+    #[arg(long, value_name = "SHARE", value_parser = share, allow_hyphen_values = true)]
+    pub mass_uncertainty: Option<f64>,
+    /// Rotor inertia of every joint, kg m² [default: the robot's own]
+    #[arg(long, value_name = "X|MIN..MAX", value_parser = interval, allow_hyphen_values = true)]
+    pub rotor_inertia: Option<Interval>,
+}
+
 #[derive(Debug, Args)]
 pub struct CertifyArgs {
     #[command(flatten)]
@@ -178,15 +192,8 @@ pub struct CertifyArgs {
     /// Viscous friction of every joint, N m s/rad [default: the robot's own, 0 for the built-in ones]
     #[arg(long, value_name = "X|MIN..MAX", value_parser = interval, allow_hyphen_values = true)]
     pub friction: Option<Interval>,
-    /// Payload from 0 to this mass, kg; a point held at the grasp point [default: 0]
-    #[arg(long, value_name = "KG", value_parser = non_negative, allow_hyphen_values = true)]
-    pub payload: Option<f64>,
-    /// Link masses differ from nominal by up to this share, 0.2 for ±20 % [default: 0]
-    #[arg(long, value_name = "SHARE", value_parser = share, allow_hyphen_values = true)]
-    pub mass_uncertainty: Option<f64>,
-    /// Rotor inertia of every joint, kg m² [default: the robot's own]
-    #[arg(long, value_name = "X|MIN..MAX", value_parser = interval, allow_hyphen_values = true)]
-    pub rotor_inertia: Option<Interval>,
+    #[command(flatten)]
+    pub arms: ArmsArgs,
     /// A record of proved constants that the claims may rest on, besides the built-in ones; may be repeated
     #[arg(long, value_name = "FILE.json")]
     pub constants: Vec<PathBuf>,
@@ -235,15 +242,8 @@ pub struct ConstantsArgs {
     /// Scenario of `--over scenario`, by name or TOML file [default: pick-and-place; for a URDF file a generic one]
     #[arg(long, value_name = "NAME|FILE")]
     pub scenario: Option<String>,
-    /// Payload from 0 to this mass, kg; a point held at the grasp point [default: 0]
-    #[arg(long, value_name = "KG", value_parser = non_negative, allow_hyphen_values = true)]
-    pub payload: Option<f64>,
-    /// Link masses differ from nominal by up to this share, 0.2 for ±20 % [default: 0]
-    #[arg(long, value_name = "SHARE", value_parser = share, allow_hyphen_values = true)]
-    pub mass_uncertainty: Option<f64>,
-    /// Rotor inertia of every joint, kg m² [default: the robot's own]
-    #[arg(long, value_name = "X|MIN..MAX", value_parser = interval, allow_hyphen_values = true)]
-    pub rotor_inertia: Option<Interval>,
+    #[command(flatten)]
+    pub arms: ArmsArgs,
     /// How much time goes into tightness [default: standard]
     #[arg(long, value_name = "quick|standard|thorough", hide_possible_values = true)]
     pub effort: Option<EffortName>,

@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::claims::{AssumptionSummary, ClaimSummary, claims_in_words, growths, summaries};
 use super::verify::exit_of;
 use crate::catalogue::{self, GainsSource};
-use crate::cli::{CertifyArgs, Context, Exit, OverName, Switch};
+use crate::cli::{ArmsArgs, CertifyArgs, Context, Exit, OverName, Switch};
 use crate::error::Error;
 use crate::output;
 use crate::progress::Terminal;
@@ -102,22 +102,34 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
 }
 
 /// Least and largest value of the robot's own links.
-pub fn own(robot: &Robot, value: fn(&Link) -> f64) -> [f64; 2] {
+fn own(robot: &Robot, value: fn(&Link) -> f64) -> [f64; 2] {
     let values = || robot.links().iter().map(value);
     [values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max)]
+}
+
+impl ArmsArgs {
+    pub fn payload_kg(&self) -> [f64; 2] {
+        [0.0, self.payload.unwrap_or(0.0)]
+    }
+
+    pub fn mass_uncertainty(&self) -> f64 {
+        self.mass_uncertainty.unwrap_or(0.0)
+    }
+
+    pub fn rotor_inertia_kg_m2(&self, robot: &Robot) -> [f64; 2] {
+        self.rotor_inertia.map_or_else(|| own(robot, |link| link.rotor_inertia_kg_m2), |interval| interval.0)
+    }
 }
 
 /// The plants that the options speak of.
 fn plant_box(args: &CertifyArgs, robot: &Robot) -> PlantBox {
     PlantBox {
-        mass_uncertainty: args.mass_uncertainty.unwrap_or(0.0),
-        payload_kg: [0.0, args.payload.unwrap_or(0.0)],
+        mass_uncertainty: args.arms.mass_uncertainty(),
+        payload_kg: args.arms.payload_kg(),
         friction_n_m_s_per_rad: args
             .friction
             .map_or_else(|| own(robot, |link| link.viscous_n_m_s_per_rad), |interval| interval.0),
-        rotor_inertia_kg_m2: args
-            .rotor_inertia
-            .map_or_else(|| own(robot, |link| link.rotor_inertia_kg_m2), |interval| interval.0),
+        rotor_inertia_kg_m2: args.arms.rotor_inertia_kg_m2(robot),
         delay_samples: [0; 2],
         gravity_compensation: args.gravity_compensation == Some(Switch::On),
     }

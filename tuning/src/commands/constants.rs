@@ -5,7 +5,7 @@ use certune::verify::{Number, Record};
 use certune::{ProvingEffort, ProvingTask, prove_constants};
 use serde::Serialize;
 
-use super::certify::{over, own};
+use super::certify::over;
 use crate::catalogue;
 use crate::cli::{ConstantsArgs, Context, EffortName, Exit};
 use crate::error::Error;
@@ -44,11 +44,9 @@ pub fn run(args: &ConstantsArgs, context: Context) -> Result<Exit, Error> {
 
 fn task(args: &ConstantsArgs, robot: &Robot) -> Result<ProvingTask, Error> {
     Ok(ProvingTask {
-        mass_uncertainty: args.mass_uncertainty.unwrap_or(0.0),
-        payload_kg: [0.0, args.payload.unwrap_or(0.0)],
-        rotor_inertia_kg_m2: args
-            .rotor_inertia
-            .map_or_else(|| own(robot, |link| link.rotor_inertia_kg_m2), |interval| interval.0),
+        mass_uncertainty: args.arms.mass_uncertainty(),
+        payload_kg: args.arms.payload_kg(),
+        rotor_inertia_kg_m2: args.arms.rotor_inertia_kg_m2(robot),
         over: over(args.over, args.scenario.as_deref(), robot)?,
         effort: match args.effort {
             Some(EffortName::Quick) => ProvingEffort::Quick,
