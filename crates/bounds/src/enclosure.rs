@@ -24,7 +24,6 @@
 //! piece remain in every number.
 
 mod affine;
-mod interval;
 
 use certune_dynamics::{Model, mass_matrix, mass_matrix_derivatives};
 use certune_linsys::{JointMatrix, Joints, Real};
@@ -33,9 +32,9 @@ use rayon::prelude::*;
 
 use crate::arm_box::ArmBox;
 use crate::error::BoundsError;
+use crate::interval::Interval;
 use crate::rigorous::larger;
 use affine::Affine;
-use interval::Interval;
 
 /// Results are decimals with this many units.
 const UNITS_PER_KG_M2: f64 = 1e4;

@@ -48,6 +48,7 @@ mod constants;
 mod eigen;
 mod enclosure;
 mod error;
+mod interval;
 mod maximise;
 mod quantity;
 mod record;

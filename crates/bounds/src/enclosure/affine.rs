@@ -17,7 +17,7 @@ use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAss
 use certune_linsys::Real;
 use num_traits::{One, Zero};
 
-use super::interval::Interval;
+use crate::interval::Interval;
 
 /// A number over a box of `N` angles.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -23,7 +23,10 @@
 
 use std::f64::consts::PI;
 
+use certune_linsys::Real;
+
 use crate::error::BoundsError;
+use crate::interval::Interval;
 
 /// Polygons are larger by this share than they need be, to pay for rounding.
 const SWELL: f64 = 1.0 / (1_u64 << 38) as f64;
@@ -38,89 +41,9 @@ const OPENING_RAD: f64 = 1.0 / 256.0;
 /// Largest angle that can be given.
 pub(crate) const LARGEST_RAD: f64 = 15.0;
 
-/// A closed interval whose every operation rounds outward.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Interval {
-    /// Lower end.
-    pub lo: f64,
-    /// Upper end.
-    pub hi: f64,
-}
-
-impl Interval {
-    pub(crate) fn point(x: f64) -> Self {
-        Self { lo: x, hi: x }
-    }
-
-    /// Any two ends, rounded outward.
-    fn outward(lo: f64, hi: f64) -> Self {
-        Self { lo: lo.next_down(), hi: hi.next_up() }
-    }
-
-    pub(crate) fn plus(self, b: Self) -> Self {
-        Self::outward(self.lo + b.lo, self.hi + b.hi)
-    }
-
-    pub(crate) fn minus(self, b: Self) -> Self {
-        Self::outward(self.lo - b.hi, self.hi - b.lo)
-    }
-
-    pub(crate) fn times(self, b: Self) -> Self {
-        let products = [self.lo * b.lo, self.lo * b.hi, self.hi * b.lo, self.hi * b.hi];
-        let lo = products.into_iter().fold(f64::INFINITY, f64::min);
-        let hi = products.into_iter().fold(f64::NEG_INFINITY, f64::max);
-        Self::outward(lo, hi)
-    }
-
-    /// The interval times a fraction of integers.
-    fn scaled(self, numerator: f64, denominator: f64) -> Self {
-        let ends = [self.lo * numerator, self.hi * numerator].map(|x| [x.next_down(), x.next_up()]);
-        let (lo, hi) = (ends[0][0].min(ends[1][0]), ends[0][1].max(ends[1][1]));
-        Self::outward(lo / denominator, hi / denominator)
-    }
-
-    fn middle(self) -> f64 {
-        0.5 * (self.lo + self.hi)
-    }
-
-    fn width(self) -> f64 {
-        (self.hi - self.lo).next_up()
-    }
-}
-
 /// pi: the constant of the library is the `f64` just below it.
 fn pi() -> Interval {
-    Interval { lo: PI, hi: PI.next_up() }
-}
-
-/// Enclosures of cosine and sine.
-pub(crate) fn cos_sin(x: Interval) -> [Interval; 2] {
-    let mut doublings = 0;
-    let mut divisor = 1.0;
-    while x.lo.abs().max(x.hi.abs()) > divisor {
-        doublings += 1;
-        divisor *= 2.0;
-    }
-    let y = x.scaled(1.0, divisor);
-    let square = y.times(y);
-    let one = Interval::point(1.0);
-    let mut cos = one;
-    let mut sin = one;
-    for k in (1..=11_u32).rev() {
-        let k = f64::from(k);
-        cos = one.minus(square.times(cos).scaled(1.0, 2.0 * k * (2.0 * k - 1.0)));
-        sin = one.minus(square.times(sin).scaled(1.0, 2.0 * k * (2.0 * k + 1.0)));
-    }
-    // The next term of either alternating sum, |y| <= 1, is below 1/24! < 1e-21.
-    let remainder = Interval { lo: -1e-21, hi: 1e-21 };
-    cos = cos.plus(remainder);
-    sin = sin.times(y).plus(remainder);
-    for _ in 0..doublings {
-        let doubled = sin.times(cos).scaled(2.0, 1.0);
-        cos = cos.times(cos).scaled(2.0, 1.0).minus(one);
-        sin = doubled;
-    }
-    [cos, sin]
+    Interval::new(PI, PI.next_up())
 }
 
 /// Points with `[cos, sin]` of each, and the largest error of a coordinate.
@@ -148,11 +71,16 @@ fn middles(enclosures: &[[Interval; 2]], radius: f64) -> Result<Points, BoundsEr
     Ok(points)
 }
 
+/// `fraction pi / count`.
+fn part_of_pi(fraction: f64, count: usize) -> Interval {
+    pi() * Interval::from_f64(fraction) / Interval::from_f64(count as f64)
+}
+
 /// `exp(2 pi i k/count)`, k from 0: angles within half a turn.
 fn equispaced(count: usize) -> Vec<[Interval; 2]> {
-    let turn = pi().scaled(2.0, count as f64);
+    let turn = part_of_pi(2.0, count);
     let signed = |k: usize| if 2 * k > count { k as f64 - count as f64 } else { k as f64 };
-    (0..count).map(|k| cos_sin(turn.scaled(signed(k), 1.0))).collect()
+    (0..count).map(|k| (turn * Interval::from_f64(signed(k))).cos_sin()).collect()
 }
 
 /// `count` equispaced points of the unit circle, from angle 0; exact to [`Points::error`].
@@ -162,13 +90,13 @@ pub(crate) fn nodes(count: usize) -> Result<Points, BoundsError> {
 
 /// Upper bound of `1/cos(x)` for an `x` in `[0, pi/2)`; infinite if the enclosure of the cosine reaches 0.
 fn secant(x: Interval) -> f64 {
-    let [cos, _] = cos_sin(x);
-    if cos.lo > 0.0 { (1.0 / cos.lo).next_up() } else { f64::INFINITY }
+    let [cos, _] = x.cos_sin();
+    if cos.lower() > 0.0 { (1.0 / cos.lower()).next_up() } else { f64::INFINITY }
 }
 
 /// The factor `1/cos(2 pi/count)` of a trigonometric polynomial of degree 2, rounded up.
 pub(crate) fn degree_two_factor(count: usize) -> f64 {
-    secant(pi().scaled(2.0, count as f64))
+    secant(part_of_pi(2.0, count))
 }
 
 /// The angles of one joint.
@@ -225,19 +153,18 @@ impl Span {
         if pieces < self.fewest_pieces() {
             return Err(BoundsError::Pieces { given: pieces, least: self.fewest_pieces() });
         }
-        let count = pieces as f64;
         let mut points = match self {
             Self::Circle => {
-                let radius = (1.0 + SWELL) * secant(pi().scaled(1.0, count));
+                let radius = (1.0 + SWELL) * secant(part_of_pi(1.0, pieces));
                 middles(&equispaced(pieces), radius)?
             }
             Self::Arc(lower, upper) => {
-                let start = Interval::point(lower).minus(Interval::point(WIDEN_RAD));
-                let end = Interval::point(upper).plus(Interval::point(WIDEN_RAD));
-                let half = end.minus(start).scaled(0.5, count);
-                let ends = middles(&[cos_sin(start), cos_sin(end)], 1.0 + SWELL)?;
+                let start = Interval::from_f64(lower) - Interval::from_f64(WIDEN_RAD);
+                let end = Interval::from_f64(upper) + Interval::from_f64(WIDEN_RAD);
+                let half = (end - start) * Interval::from_f64(0.5) / Interval::from_f64(pieces as f64);
+                let ends = middles(&[start.cos_sin(), end.cos_sin()], 1.0 + SWELL)?;
                 let tangents: Vec<_> =
-                    (0..pieces).map(|k| cos_sin(start.plus(half.scaled((2 * k + 1) as f64, 1.0)))).collect();
+                    (0..pieces).map(|k| (start + half * Interval::from_f64((2 * k + 1) as f64)).cos_sin()).collect();
                 let mut points = middles(&tangents, (1.0 + SWELL) * secant(half))?;
                 points.at.extend(ends.at);
                 points.size = points.size.max(ends.size);

@@ -1,4 +1,4 @@
-//! Outward-rounded intervals, and sines of points without a mathematics library.
+//! Outward-rounded intervals, and sines without a mathematics library.
 //!
 //! Every operation rounds to nearest and then moves each end one floating-point number outward, which is at least the rounding
 //! error, underflow included. A result that would be NaN becomes the whole line.
@@ -21,10 +21,10 @@ const WHOLE: Interval = Interval { lower: f64::NEG_INFINITY, upper: f64::INFINIT
 const UNIT: Interval = Interval { lower: -1.0, upper: 1.0 };
 /// Beyond this, in rad, sine and cosine are answered with [-1, 1].
 const LARGEST_ANGLE_RAD: f64 = 16.0;
-/// Halvings before Taylor's series: `16 / 2^6` is a quarter.
-const HALVINGS: i32 = 6;
-/// Terms of the series in t^2: at `t <= 1/4` the first one left out is below `(1/16)^11 / 22! < 1e-34`.
-const TERMS: u32 = 10;
+/// Terms of Taylor's series in the square, taken at no more than 1 rad (to rounding); an angle beyond is halved before and doubled after.
+const TERMS: u32 = 11;
+/// The sums alternate: what is left out is below the next term, `1/24!`.
+const REMAINDER: f64 = 1e-21;
 
 impl Interval {
     /// `lower` to `upper`, exactly; the whole line unless `lower <= upper`.
@@ -64,25 +64,39 @@ impl Interval {
         Self::new(self.lower.min(other.lower), self.upper.max(other.upper))
     }
 
-    /// `(sin, cos)` at the point `x`, `|x| <= LARGEST_ANGLE_RAD`.
-    fn sin_cos_at(x: f64) -> (Self, Self) {
-        // Taylor with alternating signs: the remainder is below the first term left out.
-        let t = Self::from_f64(x) * Self::from_f64(0.5_f64.powi(HALVINGS));
-        let square = t * t;
-        let remainder = Self::new(-1e-30, 1e-30);
-        let (mut sin, mut cos) = (Self::one(), Self::one());
+    /// An upper bound of the distance of its ends.
+    pub(crate) fn width(self) -> f64 {
+        (self.upper - self.lower).next_up()
+    }
+
+    /// Enclosures of cosine and sine; tight for a narrow interval within [`LARGEST_ANGLE_RAD`] of 0, `[-1, 1]` beyond.
+    pub(crate) fn cos_sin(self) -> [Self; 2] {
+        let size = self.magnitude();
+        if !(size <= LARGEST_ANGLE_RAD) {
+            return [UNIT, UNIT];
+        }
+        let mut doublings = 0;
+        let mut divisor = 1.0;
+        while size > divisor {
+            doublings += 1;
+            divisor *= 2.0;
+        }
+        let two = Self::from_f64(2.0);
+        let y = self / Self::from_f64(divisor);
+        let square = y * y;
+        let (mut cos, mut sin) = (Self::one(), Self::one());
         for k in (1..=TERMS).rev() {
             let k = f64::from(k);
-            sin = Self::one() - square / Self::from_f64(2.0 * k * (2.0 * k + 1.0)) * sin;
-            cos = Self::one() - square / Self::from_f64(2.0 * k * (2.0 * k - 1.0)) * cos;
+            cos = Self::one() - square * cos / Self::from_f64(2.0 * k * (2.0 * k - 1.0));
+            sin = Self::one() - square * sin / Self::from_f64(2.0 * k * (2.0 * k + 1.0));
         }
-        sin = sin * t + remainder;
+        let remainder = Self::new(-REMAINDER, REMAINDER);
         cos += remainder;
-        let two = Self::from_f64(2.0);
-        for _ in 0..HALVINGS {
-            (sin, cos) = (two * sin * cos, Self::one() - two * sin * sin);
+        sin = sin * y + remainder;
+        for _ in 0..doublings {
+            (cos, sin) = (two * cos * cos - Self::one(), two * sin * cos);
         }
-        (sin.within_unit(), cos.within_unit())
+        [cos.within_unit(), sin.within_unit()]
     }
 
     fn within_unit(self) -> Self {
@@ -185,10 +199,9 @@ impl Real for Interval {
         Self::new(x, x)
     }
 
-    /// Tight for a point; an interval of any width is answered with [-1, 1].
     fn sin_cos(self) -> (Self, Self) {
-        let point = self.lower.to_bits() == self.upper.to_bits() && self.lower.abs() <= LARGEST_ANGLE_RAD;
-        if point { Self::sin_cos_at(self.lower) } else { (UNIT, UNIT) }
+        let [cos, sin] = self.cos_sin();
+        (sin, cos)
     }
 
     fn sqrt(self) -> Self {
