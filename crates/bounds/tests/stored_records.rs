@@ -133,7 +133,8 @@ fn attack(stored: &Stored, limits: &Limits, index: u64) {
     let rotor = Vector::from_fn(|j, _| between(&mut rng, [rotor_lower[j], rotor_upper[j]]));
     let model = arms.model(&scales, &rotor).unwrap();
     let m = mass_matrix(&model, &q);
-    let holds = |bound: &str, is_so: bool| assert!(is_so, "{}: {bound} fails at {q:?}, {scales:?}, {rotor:?}", stored.name);
+    let holds =
+        |bound: &str, is_so: bool| assert!(is_so, "{}: {bound} fails at {q:?}, {scales:?}, {rotor:?}", stored.name);
     let identity = Matrix::identity();
     let size = limits.m[1];
     holds("m_lo", not_negative(&(m - identity * limits.m[0]), size));

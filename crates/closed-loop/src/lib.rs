@@ -62,6 +62,8 @@ pub use linear::{linearise_aic, linearise_aic_sampled};
 pub use metrics::{Metrics, Segment};
 pub use plant_box::{PlantBox, PlantError, PlantSetting};
 pub use scenario::Scenario;
-pub use simulate::{NoiseStream, Plant, Progress, Recorder, Sample, Simulation, simulate};
+pub use simulate::{
+    Bundle, NoiseStream, Plant, Progress, Recorder, Run, Sample, Simulation, simulate, simulate_many, simulate_many_on,
+};
 pub use task::Task;
 pub use trajectory::{AicDiagnostics, Row, Trajectory, aic_diagnostics};

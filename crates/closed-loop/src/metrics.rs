@@ -19,7 +19,7 @@
 //!
 //! Limits: a run that diverges ends there; its last segment is judged on the samples before, with no settling times.
 
-use certune_linsys::Joints;
+use certune_linsys::{Joints, Lanes, Real};
 use serde::{Deserialize, Serialize};
 
 /// Fraction of the step within which a joint counts as settled.
@@ -100,86 +100,140 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 
 /// What one sample contributes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Contribution<const N: usize> {
+pub(crate) struct Contribution<const N: usize, T: Real = f64> {
     /// Position at the end of the sample, rad.
-    pub q: Joints<N>,
+    pub q: Joints<N, T>,
     /// Velocity at the end of the sample, rad/s.
-    pub dq: Joints<N>,
+    pub dq: Joints<N, T>,
     /// Torque asked of the motor, N m.
-    pub asked: Joints<N>,
+    pub asked: Joints<N, T>,
     /// Torque the motor gives, N m.
-    pub given: Joints<N>,
+    pub given: Joints<N, T>,
 }
 
-/// Accumulates one segment. `Copy`, no heap.
+/// Accumulates one segment in every lane. `Copy`, no heap; counts are whole numbers.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Meter<const N: usize> {
-    from_step: u64,
-    samples: u64,
-    goal: Joints<N>,
-    commanded: Joints<N>,
-    error: Joints<N>,
-    last_outside: [u64; N],
-    overshoot: Joints<N>,
-    peak_torque: Joints<N>,
-    peak_speed: Joints<N>,
-    saturated: [u64; N],
-    rate_squares: Joints<N>,
-    rates: u64,
+pub(crate) struct Meter<const N: usize, T: Real = f64> {
+    from_step: T,
+    samples: T,
+    goal: Joints<N, T>,
+    commanded: Joints<N, T>,
+    error: Joints<N, T>,
+    last_outside: Joints<N, T>,
+    overshoot: Joints<N, T>,
+    peak_torque: Joints<N, T>,
+    peak_speed: Joints<N, T>,
+    saturated: Joints<N, T>,
+    rate_squares: Joints<N, T>,
+    rates: T,
     /// Sum of sample number times |e|.
-    itae: Joints<N>,
+    itae: Joints<N, T>,
 }
 
 impl<const N: usize> Meter<N> {
     pub fn new(from_step: u64, q: &Joints<N>, previous_goal: &Joints<N>, goal: &Joints<N>) -> Self {
         Self {
-            from_step,
-            samples: 0,
+            from_step: from_step as f64,
+            samples: 0.0,
             goal: *goal,
             commanded: goal - previous_goal,
             error: q - goal,
-            last_outside: [0; N],
+            last_outside: Joints::zeros(),
             overshoot: Joints::zeros(),
             peak_torque: Joints::zeros(),
             peak_speed: Joints::zeros(),
-            saturated: [0; N],
+            saturated: Joints::zeros(),
             rate_squares: Joints::zeros(),
-            rates: 0,
+            rates: 0.0,
             itae: Joints::zeros(),
         }
     }
+}
 
-    pub fn add(&mut self, sample: &Contribution<N>, previously_given: Option<&Joints<N>>, limit: &Joints<N>) {
-        self.samples += 1;
-        self.rates += u64::from(previously_given.is_some());
-        self.error = sample.q - self.goal;
-        for joint in 0..N {
-            let (error, step) = (self.error[joint], self.commanded[joint]);
-            if !(error.abs() <= SETTLING_BAND * step.abs()) {
-                self.last_outside[joint] = self.samples;
-            }
-            self.overshoot[joint] = self.overshoot[joint].max(step.signum() * error);
-            self.peak_torque[joint] = self.peak_torque[joint].max(sample.asked[joint].abs());
-            self.peak_speed[joint] = self.peak_speed[joint].max(sample.dq[joint].abs());
-            self.saturated[joint] += u64::from(sample.asked[joint].abs() > limit[joint]);
-            self.itae[joint] += self.samples as f64 * error.abs();
-            if let Some(before) = previously_given {
-                let change = sample.given[joint] - before[joint];
-                self.rate_squares[joint] += change * change;
-            }
+impl<const N: usize, T: Lanes> Meter<N, T> {
+    /// The meters of all lanes side by side.
+    pub fn pack(of: impl Fn(usize) -> Meter<N>) -> Self {
+        let number = |get: fn(&Meter<N>) -> f64| T::from_lanes(|lane| get(&of(lane)));
+        let joints =
+            |get: fn(&Meter<N>) -> &Joints<N>| Joints::from_fn(|joint, _| T::from_lanes(|lane| get(&of(lane))[joint]));
+        Self {
+            from_step: number(|m| m.from_step),
+            samples: number(|m| m.samples),
+            goal: joints(|m| &m.goal),
+            commanded: joints(|m| &m.commanded),
+            error: joints(|m| &m.error),
+            last_outside: joints(|m| &m.last_outside),
+            overshoot: joints(|m| &m.overshoot),
+            peak_torque: joints(|m| &m.peak_torque),
+            peak_speed: joints(|m| &m.peak_speed),
+            saturated: joints(|m| &m.saturated),
+            rate_squares: joints(|m| &m.rate_squares),
+            rates: number(|m| m.rates),
+            itae: joints(|m| &m.itae),
         }
     }
 
+    /// The meter of one lane.
+    pub fn lane(&self, lane: usize) -> Meter<N> {
+        let joints = |of: &Joints<N, T>| Joints::from_fn(|joint, _| of[joint].lane(lane));
+        Meter {
+            from_step: self.from_step.lane(lane),
+            samples: self.samples.lane(lane),
+            goal: joints(&self.goal),
+            commanded: joints(&self.commanded),
+            error: joints(&self.error),
+            last_outside: joints(&self.last_outside),
+            overshoot: joints(&self.overshoot),
+            peak_torque: joints(&self.peak_torque),
+            peak_speed: joints(&self.peak_speed),
+            saturated: joints(&self.saturated),
+            rate_squares: joints(&self.rate_squares),
+            rates: self.rates.lane(lane),
+            itae: joints(&self.itae),
+        }
+    }
+
+    /// One sample more; `previously_given` from the run's second sample on.
+    #[inline(always)]
+    pub fn add(&mut self, sample: &Contribution<N, T>, previously_given: Option<&Joints<N, T>>, limit: &Joints<N, T>) {
+        let (zero, one) = (T::zero(), T::one());
+        self.samples += one;
+        if previously_given.is_some() {
+            self.rates += one;
+        }
+        for joint in 0..N {
+            let (error, step) = (sample.q[joint] - self.goal[joint], self.commanded[joint]);
+            let (size, asked, speed) = (error.abs(), sample.asked[joint].abs(), sample.dq[joint].abs());
+            let largest = |a: T, b: T| a.choose(b, b, a);
+            self.error[joint] = error;
+            let band = step.abs() * T::from_f64(SETTLING_BAND);
+            self.last_outside[joint] = size.choose(band, self.last_outside[joint], self.samples);
+            // Past the goal in the direction of the step.
+            let past = zero.choose(step, error, -error);
+            self.overshoot[joint] = largest(self.overshoot[joint], past);
+            self.peak_torque[joint] = largest(self.peak_torque[joint], asked);
+            self.peak_speed[joint] = largest(self.peak_speed[joint], speed);
+            self.saturated[joint] += asked.choose(limit[joint], zero, one);
+            self.itae[joint] = self.samples.mul_add(size, self.itae[joint]);
+            if let Some(before) = previously_given {
+                let change = sample.given[joint] - before[joint];
+                self.rate_squares[joint] = change.mul_add(change, self.rate_squares[joint]);
+            }
+        }
+    }
+}
+
+impl<const N: usize> Meter<N> {
     pub fn finish(&self, step_s: f64, diverged: bool) -> Segment {
         let each = |value: &dyn Fn(usize) -> f64| (0..N).map(value).collect::<Vec<f64>>();
         let moves = |joint: usize| self.commanded[joint].abs() >= LEAST_STEP_RAD;
         let settled = |joint: usize| {
             let inside_at_end = self.last_outside[joint] < self.samples;
-            (moves(joint) && inside_at_end && !diverged).then(|| self.last_outside[joint] as f64 * step_s)
+            (moves(joint) && inside_at_end && !diverged).then(|| self.last_outside[joint] * step_s)
         };
         Segment {
-            from_s: self.from_step as f64 * step_s,
-            duration_s: self.samples as f64 * step_s,
+            from_s: self.from_step * step_s,
+            duration_s: self.samples * step_s,
             goal_rad: each(&|joint| self.goal[joint]),
             final_error_rad: each(&|joint| self.error[joint]),
             settling_time_s: (0..N).map(settled).collect(),
@@ -187,10 +241,9 @@ impl<const N: usize> Meter<N> {
                 .map(|joint| moves(joint).then(|| self.overshoot[joint] / self.commanded[joint].abs()))
                 .collect(),
             peak_torque_n_m: each(&|joint| self.peak_torque[joint]),
-            saturated_steps: self.saturated.to_vec(),
-            torque_rate_rms_n_m_per_s: each(&|joint| {
-                (self.rate_squares[joint] / self.rates.max(1) as f64).sqrt() / step_s
-            }),
+            // A whole number below 2^53.
+            saturated_steps: self.saturated.iter().map(|count| *count as u64).collect(),
+            torque_rate_rms_n_m_per_s: each(&|joint| (self.rate_squares[joint] / self.rates.max(1.0)).sqrt() / step_s),
             itae_rad_s2: each(&|joint| self.itae[joint] * step_s * step_s),
             peak_speed_rad_per_s: each(&|joint| self.peak_speed[joint]),
         }

@@ -28,14 +28,21 @@
 //! **Sub-steps** divide the sample of the plant; torque and pushes are held. Limits of the model: no joint stops, no sensor
 //! delay, torque exact once it is given. A run stops as diverged when a joint leaves ±20 rad or ±1000 rad/s, or is no number.
 //!
+//! **Lanes.** A [`Bundle`] runs as many plants side by side as its scalar has lanes; a [`Simulation`] is a bundle of one. Lanes may differ in plant, delay,
+//! start, goals, loads, pushes, noise and gains, and a lane that diverges or has finished keeps the figures that it had. [`simulate_many`]
+//! fills the registers of the machine at hand.
+//!
 //! Nothing in the loop over samples allocates.
 
+use certune_control::aic::{Aic, AicParams};
 use certune_control::{Controller, Measurement};
 use certune_dynamics::{
     COULOMB_SPEED_RAD_PER_S, Model, Robot, State, flange_jacobian, forward_dynamics, forward_dynamics_with_armature,
     gravity_torque,
 };
-use certune_linsys::{Joints, Real};
+use certune_linsys::{Joints, Lanes, Real};
+use certune_simd::{InstructionSet, Kernel};
+use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
@@ -46,6 +53,10 @@ use crate::task::{Interval, Load, Task};
 
 /// The longest actuation delay, samples.
 pub const MAX_DELAY_SAMPLES: usize = 16;
+/// Commands that are remembered.
+const RING: usize = MAX_DELAY_SAMPLES + 1;
+/// No register has more lanes.
+const MOST_LANES: usize = 8;
 /// A joint beyond this has diverged, rad.
 pub const DIVERGED_RAD: f64 = 20.0;
 /// A joint faster than this has diverged, rad/s.
@@ -113,34 +124,34 @@ pub struct NoiseStream {
 
 /// One sample, as a [`Recorder`] sees it.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample<'a, const N: usize, S> {
+pub struct Sample<'a, const N: usize, S, T: Real = f64> {
     /// Number of the sample, from 0.
     pub step: u64,
     /// Its start, s.
     pub t_s: f64,
     /// True positions and velocities at its start.
-    pub at: State<N>,
+    pub at: State<N, T>,
     /// What the controller was told.
-    pub measurement: Measurement<N>,
+    pub measurement: Measurement<N, T>,
     /// The goal the controller was given, rad: on its way to the task's when the task limits its speed.
-    pub goal: Joints<N>,
+    pub goal: Joints<N, T>,
     /// The torque the controller asks for, before delay, N m.
-    pub u: Joints<N>,
+    pub u: Joints<N, T>,
     /// The torque the motor gives during the sample, N m.
-    pub tau: Joints<N>,
+    pub tau: Joints<N, T>,
     /// The controller's state after its step.
     pub state: &'a S,
 }
 
 /// Looks at every sample of a run. `()` looks away.
-pub trait Recorder<const N: usize, S> {
+pub trait Recorder<const N: usize, S, T: Real = f64> {
     /// Called once per sample, after the controller and before the plant moves.
-    fn sample(&mut self, sample: &Sample<'_, N, S>);
+    fn sample(&mut self, sample: &Sample<'_, N, S, T>);
 }
 
-impl<const N: usize, S> Recorder<N, S> for () {
-    #[inline]
-    fn sample(&mut self, _: &Sample<'_, N, S>) {}
+impl<const N: usize, S, T: Real> Recorder<N, S, T> for () {
+    #[inline(always)]
+    fn sample(&mut self, _: &Sample<'_, N, S, T>) {}
 }
 
 /// What a step of a [`Simulation`] left behind.
@@ -154,71 +165,191 @@ pub enum Progress {
     Diverged(f64),
 }
 
-/// A run in progress. [`simulate`] is the usual way; this one can be stopped, looked at and forked.
+/// A plant, its task and its noise: one lane of a [`Bundle`].
+#[derive(Clone, Copy, Debug)]
+pub struct Run<'a, const N: usize> {
+    /// The arm.
+    pub plant: &'a Plant<N>,
+    /// What it is to do.
+    pub task: &'a Task<N>,
+    /// Which noise its sensors have; a task without noise ignores it.
+    pub noise: NoiseStream,
+}
+
+/// What changes seldom in a lane, and what is kept of it.
 #[derive(Debug)]
-pub struct Simulation<'a, const N: usize, C: Controller<N>> {
+struct Lane<'a, const N: usize> {
     plant: &'a Plant<N>,
     task: &'a Task<N>,
-    controller: &'a C,
     /// The arm with the loads attached now.
     model: Model<N>,
-    coulomb: bool,
-    state: State<N>,
-    controller_state: C::State,
-    commands: [Joints<N>; MAX_DELAY_SAMPLES + 1],
-    given: Option<Joints<N>>,
-    /// The goal the controller was given last.
-    goal: Joints<N>,
     noise: Option<ChaCha8Rng>,
-    step: u64,
     segment: usize,
     segment_end: u64,
+    /// Meters of the segments behind.
     meters: Vec<Meter<N>>,
     progress: Progress,
 }
 
+impl<const N: usize> Lane<'_, N> {
+    fn runs(&self) -> bool {
+        self.progress == Progress::Running
+    }
+
+    /// The task's goal; the last one when the task is over.
+    fn goal(&self) -> Joints<N> {
+        self.task.segments.get(self.segment).or(self.task.segments.last()).map_or(self.task.start, |s| s.goal)
+    }
+}
+
+/// Runs side by side, one in each lane of T. [`simulate`] and [`simulate_many`] are the usual way; this one can be stopped, looked at and changed.
+#[derive(Debug)]
+pub struct Bundle<'a, const N: usize, C: Controller<N, T>, T: Lanes> {
+    lanes: Vec<Lane<'a, N>>,
+    controller: &'a C,
+    step_s: f64,
+    integrator: Integrator,
+    /// The arms with the loads attached now, and without.
+    model: Model<N, T>,
+    nominal: Model<N, T>,
+    coulomb: bool,
+    state: State<N, T>,
+    controller_state: C::State,
+    commands: [Joints<N, T>; RING],
+    given: Joints<N, T>,
+    /// The goals of the tasks, and those the controller was given last.
+    ordered: Joints<N, T>,
+    goal: Joints<N, T>,
+    /// 1 where the arm compensates its gravity.
+    compensated: T,
+    motor_limit: Joints<N, T>,
+    /// The motor's limit where the task asks for limits, infinite elsewhere.
+    clamp: Joints<N, T>,
+    features: Features,
+    meter: Meter<N, T>,
+    step: u64,
+    /// The next step at which some lane has another goal.
+    next_goal: u64,
+    /// Lanes whose runs go on.
+    running: usize,
+}
+
+/// What some lane of a bundle needs.
+#[derive(Clone, Copy, Debug)]
+struct Features {
+    noise: bool,
+    loads: bool,
+    pushes: bool,
+    compensation: bool,
+    /// Every lane's delay, when it is the same.
+    delay: Option<usize>,
+}
+
+/// A run in progress, of one plant.
+pub type Simulation<'a, const N: usize, C> = Bundle<'a, N, C, f64>;
+
 impl<'a, const N: usize, C: Controller<N>> Simulation<'a, N, C> {
     /// A run about to begin: the arm rests at the task's start, the controller's beliefs are at the first measurement.
     pub fn new(plant: &'a Plant<N>, task: &'a Task<N>, controller: &'a C, noise: NoiseStream) -> Self {
-        let state = State::at_rest(task.start);
-        let noise = (task.noise.q_rad > 0.0 || task.noise.dq_rad_per_s > 0.0).then(|| {
-            let mut rng = ChaCha8Rng::seed_from_u64(noise.seed);
-            rng.set_stream(!noise.index); // plants count from 0 upwards, noise from the other end
-            rng
-        });
-        let mut meters = Vec::with_capacity(task.segments.len());
-        if let Some(first) = task.segments.first() {
-            meters.push(Meter::new(0, &state.q, &task.start, &first.goal));
-        }
+        Self::side_by_side(&[Run { plant, task, noise }], controller)
+    }
+
+    /// The figures so far.
+    pub fn metrics(&self) -> Metrics {
+        self.metrics_of(0)
+    }
+}
+
+/// The models of some lanes.
+fn pack<const N: usize, T: Lanes>(of: impl Fn(usize) -> Model<N>) -> Model<N, T> {
+    let models: [Model<N>; MOST_LANES] = core::array::from_fn(|lane| of(lane.min(T::LANES - 1)));
+    Model::pack(&models.each_ref(), |numbers| T::from_lanes(|lane| numbers[lane]))
+}
+
+fn pack_joints<const N: usize, T: Lanes>(of: impl Fn(usize) -> Joints<N>) -> Joints<N, T> {
+    Joints::from_fn(|joint, _| T::from_lanes(|lane| of(lane)[joint]))
+}
+
+impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
+    /// Runs about to begin: each arm rests at its task's start, the controller's beliefs are at the first measurement.
+    ///
+    /// Sampling step, integrator and goal limiter are those of the first run's task, see [`Task::steps_alike`]. With fewer runs than lanes
+    /// the first one is repeated in the others, whose figures nobody asks for; more runs than lanes are left out, and no run at all is none to be had:
+    /// `runs` must not be empty.
+    pub fn side_by_side(runs: &[Run<'a, N>], controller: &'a C) -> Self {
+        let run_of = |lane: usize| runs.get(lane).unwrap_or(&runs[0]);
+        let lane = |index: usize| {
+            let Run { plant, task, noise } = *run_of(index);
+            let noise = (task.noise.q_rad > 0.0 || task.noise.dq_rad_per_s > 0.0).then(|| {
+                let mut rng = ChaCha8Rng::seed_from_u64(noise.seed);
+                rng.set_stream(!noise.index); // plants count from 0 upwards, noise from the other end
+                rng
+            });
+            let absent = index >= runs.len() || task.segments.is_empty();
+            Lane {
+                plant,
+                task,
+                model: plant.model.clone(),
+                noise,
+                segment: 0,
+                segment_end: task.segments.first().map_or(0, |first| first.steps),
+                meters: Vec::with_capacity(task.segments.len()),
+                progress: if absent { Progress::Finished } else { Progress::Running },
+            }
+        };
+        let mut lanes: Vec<Lane<'a, N>> = (0..T::LANES).map(lane).collect();
+        let nominal = pack(|lane| lanes[lane].plant.model.clone());
+        let state = State::at_rest(pack_joints(|lane| lanes[lane].task.start));
+        let meter = |lane: &Lane<'_, N>| Meter::new(0, &lane.task.start, &lane.task.start, &lane.goal());
+        let delay = lanes[0].plant.delay_samples;
+        let features = Features {
+            noise: lanes.iter().any(|lane| lane.noise.is_some()),
+            loads: lanes.iter().any(|lane| !lane.task.payloads.is_empty()),
+            pushes: lanes.iter().any(|lane| !lane.task.pushes.is_empty()),
+            compensation: lanes.iter().any(|lane| lane.plant.gravity_compensation),
+            delay: lanes.iter().all(|lane| lane.plant.delay_samples == delay).then_some(delay),
+        };
         // The controller starts from the first measurement, which is as noisy as any other: a copy of the stream gives it early.
-        let first = measure(&state, task, &mut noise.clone());
+        let noise: Vec<Option<ChaCha8Rng>> = lanes.iter().map(|lane| lane.noise.clone()).collect();
+        let first = measure(&state, &mut lanes, features.noise);
+        lanes.iter_mut().zip(noise).for_each(|(lane, noise)| lane.noise = noise);
+        let limit = |lane: usize, always: bool| {
+            let Lane { plant, task, .. } = &lanes[lane];
+            if always || task.torque_limits { plant.torque_limit_n_m } else { Joints::repeat(f64::INFINITY) }
+        };
+        let task = lanes[0].task;
         Self {
-            plant,
-            task,
             controller,
-            model: plant.model.clone(),
-            coulomb: plant.model.coulomb_n_m().iter().any(|friction| *friction > 0.0),
-            state,
+            step_s: task.step_s,
+            integrator: task.integrator,
+            coulomb: lanes.iter().any(|lane| lane.plant.model.coulomb_n_m().iter().any(|friction| *friction > 0.0)),
+            model: nominal.clone(),
+            nominal,
             controller_state: controller.start(&first),
-            commands: [Joints::zeros(); MAX_DELAY_SAMPLES + 1],
-            given: None,
-            goal: task.start,
-            noise,
+            commands: [Joints::zeros(); RING],
+            given: Joints::zeros(),
+            ordered: pack_joints(|lane| lanes[lane].goal()),
+            goal: state.q,
+            state,
+            compensated: T::from_lanes(|lane| f64::from(u8::from(lanes[lane].plant.gravity_compensation))),
+            motor_limit: pack_joints(|lane| limit(lane, true)),
+            clamp: pack_joints(|lane| limit(lane, false)),
+            features,
+            meter: Meter::pack(|lane| meter(&lanes[lane])),
             step: 0,
-            segment: 0,
-            segment_end: task.segments.first().map_or(0, |first| first.steps),
-            meters,
-            progress: if task.segments.is_empty() { Progress::Finished } else { Progress::Running },
+            running: lanes.iter().filter(|lane| lane.runs()).count(),
+            next_goal: lanes.iter().filter(|lane| lane.runs()).map(|lane| lane.segment_end).min().unwrap_or(u64::MAX),
+            lanes,
         }
     }
 
-    /// Where the arm is.
-    pub fn state(&self) -> &State<N> {
+    /// Where the arms are.
+    pub fn state(&self) -> &State<N, T> {
         &self.state
     }
 
-    /// Puts the arm somewhere else; for tests and what-if questions.
-    pub fn set_state(&mut self, state: State<N>) {
+    /// Puts the arms somewhere else; for tests and what-if questions.
+    pub fn set_state(&mut self, state: State<N, T>) {
         self.state = state;
     }
 
@@ -232,102 +363,228 @@ impl<'a, const N: usize, C: Controller<N>> Simulation<'a, N, C> {
         self.controller_state = state;
     }
 
-    /// Whether the run goes on.
+    /// Whether the runs go on: running while any lane is, then how the first one ended.
+    #[inline]
     pub fn progress(&self) -> Progress {
-        self.progress
+        if self.running > 0 { Progress::Running } else { self.lanes[0].progress }
+    }
+
+    /// Ends the run in a lane before its time; its figures are those so far.
+    pub fn stop(&mut self, lane: usize) {
+        if self.lanes[lane].runs() {
+            self.end(lane, Progress::Finished);
+        }
     }
 
     /// Attaches and releases loads whose time has come.
     fn change_loads(&mut self) {
-        let changes = |during: &Interval| during.from == self.step || during.until == self.step;
-        if self.task.payloads.iter().any(|load| changes(&load.during)) {
-            self.model = self.plant.model.clone();
-            for load in self.task.payloads.iter().filter(|load| load.during.contains(self.step)) {
-                self.model = self.model.with_payload(&load.payload);
+        let step = self.step;
+        let changes = |during: &Interval| during.from == step || during.until == step;
+        let mut changed = false;
+        for lane in &mut self.lanes {
+            if lane.task.payloads.iter().any(|load| changes(&load.during)) {
+                changed = true;
+                lane.model = lane.plant.model.clone();
+                for load in lane.task.payloads.iter().filter(|load| load.during.contains(step)) {
+                    lane.model = lane.model.with_payload(&load.payload);
+                }
             }
+        }
+        if changed {
+            self.model = pack(|lane| self.lanes[lane].model.clone());
         }
     }
 
-    fn pushes(&self) -> Option<Joints<N>> {
-        let mut acting = self.task.pushes.iter().filter(|push| push.during.contains(self.step)).peekable();
-        acting.peek()?;
-        Some(acting.fold(Joints::zeros(), |sum, push| match push.load {
-            Load::Torque(torque) => sum + torque,
-            Load::FlangeForce(force) => {
-                sum + flange_jacobian(&self.model, &self.state.q).fixed_rows::<3>(0).transpose() * force
+    /// What pushes the arms now, added to the motors' torque; a lane that nothing pushes keeps its torque to the bit.
+    fn pushed(&self, given: &Joints<N, T>) -> Joints<N, T> {
+        let mut torque = [Joints::<N>::zeros(); MOST_LANES];
+        let mut force = [Vector3::<f64>::zeros(); MOST_LANES];
+        let mut acts = [0.0; MOST_LANES];
+        let mut any_force = false;
+        for (index, lane) in self.lanes.iter().enumerate() {
+            for push in lane.task.pushes.iter().filter(|push| push.during.contains(self.step)) {
+                acts[index] = 1.0;
+                match push.load {
+                    Load::Torque(more) => torque[index] += more,
+                    Load::FlangeForce(more) => {
+                        any_force = true;
+                        force[index] += more;
+                    }
+                }
             }
-        }))
+        }
+        if acts.iter().all(|acts| *acts <= 0.0) {
+            return *given;
+        }
+        let mut push = pack_joints::<N, T>(|lane| torque[lane]);
+        if any_force {
+            let force = Vector3::from_fn(|axis, _| T::from_lanes(|lane| force[lane][axis]));
+            push += flange_jacobian(&self.model, &self.state.q).fixed_rows::<3>(0).transpose() * force;
+        }
+        let acts = T::from_lanes(|lane| acts[lane]);
+        Joints::from_fn(|joint, _| acts.choose(T::zero(), given[joint], given[joint] + push[joint]))
     }
 
-    /// One sample. Does nothing once the run is over. No heap.
-    pub fn advance<R: Recorder<N, C::State>>(&mut self, recorder: &mut R) -> Progress {
-        let Progress::Running = self.progress else { return self.progress };
-        let (plant, task) = (self.plant, self.task);
-        let ordered = task.segments[self.segment].goal;
-        self.goal = task.goal_limiter.map_or(ordered, |limiter| limiter.step(&self.goal, &ordered));
+    /// The commands that reach the motors in this sample.
+    #[inline(always)]
+    fn delayed(&self) -> Joints<N, T> {
+        let slot = |delay: usize| (self.step as usize + RING - delay) % RING;
+        match self.features.delay {
+            Some(delay) => self.commands[slot(delay)],
+            None => Joints::from_fn(|joint, _| {
+                T::from_lanes(|lane| self.commands[slot(self.lanes[lane].plant.delay_samples)][joint].lane(lane))
+            }),
+        }
+    }
+
+    /// One sample. Does nothing once the runs are over. No heap.
+    #[inline(always)]
+    pub fn advance<R: Recorder<N, C::State, T>>(&mut self, recorder: &mut R) -> Progress {
+        if self.progress() != Progress::Running {
+            return self.progress();
+        }
+        self.goal =
+            self.lanes[0].task.goal_limiter.map_or(self.ordered, |limiter| limiter.step(&self.goal, &self.ordered));
         let goal = self.goal;
-        self.change_loads();
-        let measurement = measure(&self.state, task, &mut self.noise);
+        if self.features.loads {
+            self.change_loads();
+        }
+        let measurement = measure(&self.state, &mut self.lanes, self.features.noise);
         let (controller_state, u) = self.controller.step(&self.controller_state, &measurement, &goal);
         self.controller_state = controller_state;
 
-        let ring = plant.delay_samples + 1;
-        let slot = (self.step % ring as u64) as usize;
-        self.commands[slot] = u;
-        let delayed = self.commands[(slot + 1) % ring];
-        let asked =
-            if plant.gravity_compensation { delayed + gravity_torque(&plant.model, &self.state.q) } else { delayed };
-        let given = if task.torque_limits {
-            asked.zip_map(&plant.torque_limit_n_m, |torque, limit| torque.clamp_symmetric(limit))
-        } else {
-            asked
-        };
-        let t_s = self.step as f64 * task.step_s;
+        self.commands[self.step as usize % RING] = u;
+        let mut asked = self.delayed();
+        if self.features.compensation {
+            let gravity = gravity_torque(&self.nominal, &self.state.q);
+            for joint in 0..N {
+                let with = asked[joint] + gravity[joint];
+                asked[joint] = self.compensated.choose(T::zero(), asked[joint], with);
+            }
+        }
+        let mut given = asked;
+        for joint in 0..N {
+            given[joint] = asked[joint].clamp_symmetric(self.clamp[joint]);
+        }
+        let t_s = self.step as f64 * self.step_s;
         let (step, at, state) = (self.step, self.state, &self.controller_state);
         recorder.sample(&Sample { step, t_s, at, measurement, goal, u, tau: given, state });
 
-        let torque = self.pushes().map_or(given, |push| given + push);
-        let next = integrate(&self.model, self.coulomb, self.state, &torque, &task.integrator, task.step_s);
+        let torque = if self.features.pushes { self.pushed(&given) } else { given };
+        let next = integrate(&self.model, self.coulomb, self.state, &torque, &self.integrator, self.step_s);
         self.step += 1;
-        let inside = |values: &Joints<N>, bound: f64| values.iter().all(|value| value.abs() <= bound);
-        if !(inside(&next.q, DIVERGED_RAD) && inside(&next.dq, DIVERGED_RAD_PER_S)) {
-            self.progress = Progress::Diverged(self.step as f64 * task.step_s);
-            return self.progress;
+        // 0 where every joint is in its place.
+        let (zero, one) = (T::zero(), T::one());
+        let mut outside = zero;
+        for joint in 0..N {
+            outside += next.q[joint].abs().choose(T::from_f64(DIVERGED_RAD), zero, one);
+            outside += next.dq[joint].abs().choose(T::from_f64(DIVERGED_RAD_PER_S), zero, one);
+        }
+        if !outside.is_zero() {
+            self.diverge(&outside);
+            if self.progress() != Progress::Running {
+                return self.progress();
+            }
         }
         self.state = next;
-        if let Some(meter) = self.meters.last_mut() {
-            let sample = Contribution { q: next.q, dq: next.dq, asked, given };
-            meter.add(&sample, self.given.as_ref(), &plant.torque_limit_n_m);
+        let before = (step > 0).then_some(&self.given);
+        self.meter.add(&Contribution { q: next.q, dq: next.dq, asked, given }, before, &self.motor_limit);
+        self.given = given;
+        if self.step == self.next_goal {
+            self.next_goals();
         }
-        self.given = Some(given);
-        if self.step == self.segment_end {
-            self.next_segment();
-        }
-        self.progress
+        self.progress()
     }
 
-    fn next_segment(&mut self) {
-        let previous = self.task.segments[self.segment].goal;
-        self.segment += 1;
-        match self.task.segments.get(self.segment) {
-            Some(segment) => {
-                self.segment_end += segment.steps;
-                self.meters.push(Meter::new(self.step, &self.state.q, &previous, &segment.goal));
+    /// Ends the runs of the lanes that are outside, on the figures before this sample.
+    fn diverge(&mut self, outside: &T) {
+        for lane in 0..T::LANES {
+            if self.lanes[lane].runs() && outside.lane(lane) > 0.0 {
+                self.end(lane, Progress::Diverged(self.step as f64 * self.step_s));
             }
-            None => self.progress = Progress::Finished,
         }
     }
 
-    /// The figures so far.
-    pub fn metrics(&self) -> Metrics {
-        let diverged_at_s = match self.progress {
+    /// Keeps the meter of a lane and ends its run.
+    fn end(&mut self, lane: usize, progress: Progress) {
+        let meter = self.meter.lane(lane);
+        let lane = &mut self.lanes[lane];
+        lane.meters.push(meter);
+        lane.progress = progress;
+        self.running -= 1;
+    }
+
+    /// The lanes whose goal's time is over get the next, or end.
+    fn next_goals(&mut self) {
+        let step = self.step;
+        for index in 0..T::LANES {
+            if !self.lanes[index].runs() || self.lanes[index].segment_end != step {
+                continue;
+            }
+            let previous = self.lanes[index].goal();
+            if self.lanes[index].segment + 1 == self.lanes[index].task.segments.len() {
+                self.end(index, Progress::Finished);
+                continue;
+            }
+            let meter = self.meter.lane(index);
+            let q = self.state.q;
+            let lane = &mut self.lanes[index];
+            lane.meters.push(meter);
+            lane.segment += 1;
+            lane.segment_end += lane.task.segments[lane.segment].steps;
+            let goal = lane.goal();
+            let fresh = Meter::new(step, &Joints::from_fn(|joint, _| q[joint].lane(index)), &previous, &goal);
+            let meter = &self.meter;
+            self.meter = Meter::pack(|lane| if lane == index { fresh } else { meter.lane(lane) });
+        }
+        self.ordered = pack_joints(|lane| self.lanes[lane].goal());
+        let ends = self.lanes.iter().filter(|lane| lane.runs()).map(|lane| lane.segment_end);
+        self.next_goal = ends.min().unwrap_or(u64::MAX);
+    }
+
+    /// The figures of a lane so far.
+    pub fn metrics_of(&self, lane: usize) -> Metrics {
+        let current = self.meter.lane(lane);
+        let lane = &self.lanes[lane];
+        let diverged_at_s = match lane.progress {
             Progress::Diverged(t_s) => Some(t_s),
             Progress::Running | Progress::Finished => None,
         };
-        let segment = |(index, meter): (usize, &Meter<N>)| {
-            meter.finish(self.task.step_s, diverged_at_s.is_some() && index + 1 == self.meters.len())
+        let meters: Vec<&Meter<N>> = lane.meters.iter().chain(lane.runs().then_some(&current)).collect();
+        let segment = |(index, meter): (usize, &&Meter<N>)| {
+            meter.finish(self.step_s, diverged_at_s.is_some() && index + 1 == meters.len())
         };
-        Metrics { segments: self.meters.iter().enumerate().map(segment).collect(), diverged_at_s }
+        Metrics { segments: meters.iter().enumerate().map(segment).collect(), diverged_at_s }
+    }
+}
+
+/// Runs tasks under the active inference controller, as many side by side as this machine's registers hold, and returns their figures in the same order.
+///
+/// Each run has its own gains. Runs of tasks that do not step alike ([`Task::steps_alike`]) do not share a bundle. On one instruction set the figures of a
+/// run are the same to the bit whatever it is run beside; they are those of [`simulate`] up to rounding. Runs on the current thread.
+pub fn simulate_many<const N: usize>(runs: &[(Run<'_, N>, &AicParams<N>)]) -> Vec<Metrics> {
+    simulate_many_on(InstructionSet::widest(), runs)
+}
+
+/// [`simulate_many`] on an instruction set of one's choice.
+pub fn simulate_many_on<const N: usize>(set: InstructionSet, runs: &[(Run<'_, N>, &AicParams<N>)]) -> Vec<Metrics> {
+    let alike = runs.chunk_by(|(a, _), (b, _)| a.task.steps_alike(b.task));
+    alike.flat_map(|runs| runs.chunks(set.lanes())).flat_map(|runs| set.run(WholeTasks(runs))).collect()
+}
+
+/// A bundle from its start to its end.
+struct WholeTasks<'a, 'b, const N: usize>(&'a [(Run<'b, N>, &'b AicParams<N>)]);
+
+impl<const N: usize> Kernel for WholeTasks<'_, '_, N> {
+    type Output = Vec<Metrics>;
+    #[inline(always)]
+    fn run<T: Lanes>(self) -> Vec<Metrics> {
+        let Some((_, first)) = self.0.first() else { return Vec::new() };
+        let runs: Vec<Run<'_, N>> = self.0.iter().map(|(run, _)| *run).collect();
+        let controller = Aic::<N, T>::pack(|lane| self.0.get(lane).map_or(*first, |(_, params)| *params));
+        let mut bundle = Bundle::side_by_side(&runs, &controller);
+        while bundle.advance(&mut ()) == Progress::Running {}
+        (0..runs.len()).map(|lane| bundle.metrics_of(lane)).collect()
     }
 }
 
@@ -348,12 +605,22 @@ pub fn simulate<const N: usize, C: Controller<N>, R: Recorder<N, C::State>>(
 }
 
 /// What the sensors say about `at`.
-fn measure<const N: usize>(at: &State<N>, task: &Task<N>, noise: &mut Option<ChaCha8Rng>) -> Measurement<N> {
-    let State { q, dq } = *at;
-    let Some(rng) = noise else { return Measurement { q, dq } };
-    let mut noisy = |clean: Joints<N>, deviation: f64| clean.map(|value| value + deviation * gaussian(rng));
-    let q = noisy(q, task.noise.q_rad);
-    Measurement { q, dq: noisy(dq, task.noise.dq_rad_per_s) }
+#[inline(always)]
+fn measure<const N: usize, T: Lanes>(at: &State<N, T>, lanes: &mut [Lane<'_, N>], noise: bool) -> Measurement<N, T> {
+    let clean = Measurement { q: at.q, dq: at.dq };
+    if noise { noisy(&clean, lanes) } else { clean }
+}
+
+fn noisy<const N: usize, T: Lanes>(clean: &Measurement<N, T>, lanes: &mut [Lane<'_, N>]) -> Measurement<N, T> {
+    let mut errors = [[Joints::<N>::zeros(); 2]; MOST_LANES];
+    for (lane, [q, dq]) in lanes.iter_mut().zip(&mut errors) {
+        if let Some(rng) = &mut lane.noise {
+            q.apply(|error| *error = lane.task.noise.q_rad * gaussian(rng));
+            dq.apply(|error| *error = lane.task.noise.dq_rad_per_s * gaussian(rng));
+        }
+    }
+    let error = |which: usize| pack_joints::<N, T>(|lane| errors[lane][which]);
+    Measurement { q: clean.q + error(0), dq: clean.dq + error(1) }
 }
 
 /// A standard normal number by Box and Muller's transform; the second of each pair is not used, so that every number takes two draws.
@@ -364,42 +631,58 @@ fn gaussian(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// The state one sample later, `torque` held.
-pub(crate) fn integrate<const N: usize>(
-    model: &Model<N>,
+#[inline(always)]
+pub(crate) fn integrate<const N: usize, T: Lanes>(
+    model: &Model<N, T>,
     coulomb: bool,
-    mut state: State<N>,
-    torque: &Joints<N>,
+    mut state: State<N, T>,
+    torque: &Joints<N, T>,
     integrator: &Integrator,
     step_s: f64,
-) -> State<N> {
-    let h = step_s / f64::from(integrator.substeps);
+) -> State<N, T> {
+    let h = T::from_f64(step_s / f64::from(integrator.substeps));
     for _ in 0..integrator.substeps {
-        state = match integrator.method {
+        match integrator.method {
             Method::SemiImplicitEuler => {
                 let ddq = if coulomb {
-                    let slope = model.coulomb_n_m().zip_map(&state.dq, |friction, speed| friction * secant(speed) * h);
+                    let mut slope = *model.coulomb_n_m();
+                    for joint in 0..N {
+                        let speed = state.dq[joint];
+                        slope[joint] = slope[joint] * T::from_lanes(|lane| secant(speed.lane(lane))) * h;
+                    }
                     forward_dynamics_with_armature(model, &state, torque, &slope)
                 } else {
                     forward_dynamics(model, &state, torque)
                 };
-                let dq = state.dq + ddq * h;
-                State { q: state.q + dq * h, dq }
-            }
-            Method::RungeKutta4 => {
-                let rate = |at: &State<N>| State { q: at.dq, dq: forward_dynamics(model, at, torque) };
-                let along = |rate: &State<N>, t: f64| State { q: state.q + rate.q * t, dq: state.dq + rate.dq * t };
-                let k1 = rate(&state);
-                let k2 = rate(&along(&k1, 0.5 * h));
-                let k3 = rate(&along(&k2, 0.5 * h));
-                let k4 = rate(&along(&k3, h));
-                State {
-                    q: state.q + (k1.q + (k2.q + k3.q) * 2.0 + k4.q) * (h / 6.0),
-                    dq: state.dq + (k1.dq + (k2.dq + k3.dq) * 2.0 + k4.dq) * (h / 6.0),
+                for joint in 0..N {
+                    state.dq[joint] = ddq[joint].mul_add(h, state.dq[joint]);
+                    state.q[joint] = state.dq[joint].mul_add(h, state.q[joint]);
                 }
             }
-        };
+            Method::RungeKutta4 => state = runge_kutta(model, &state, torque, h),
+        }
     }
     state
+}
+
+/// One step of the classical method of order 4.
+fn runge_kutta<const N: usize, T: Lanes>(
+    model: &Model<N, T>,
+    state: &State<N, T>,
+    torque: &Joints<N, T>,
+    h: T,
+) -> State<N, T> {
+    let (half, two, sixth) = (h * T::from_f64(0.5), T::from_f64(2.0), h / T::from_f64(6.0));
+    let rate = |at: &State<N, T>| State { q: at.dq, dq: forward_dynamics(model, at, torque) };
+    let along = |rate: &State<N, T>, t: T| State { q: state.q + rate.q * t, dq: state.dq + rate.dq * t };
+    let k1 = rate(state);
+    let k2 = rate(&along(&k1, half));
+    let k3 = rate(&along(&k2, half));
+    let k4 = rate(&along(&k3, h));
+    State {
+        q: state.q + (k1.q + (k2.q + k3.q) * two + k4.q) * sixth,
+        dq: state.dq + (k1.dq + (k2.dq + k3.dq) * two + k4.dq) * sixth,
+    }
 }
 
 /// `tanh(dq/ε)/dq`, s/rad: `1/ε` at rest.

@@ -81,3 +81,11 @@ pub struct Task<const N: usize> {
     /// Disturbances.
     pub pushes: Vec<TaskPush<N>>,
 }
+
+impl<const N: usize> Task<N> {
+    /// Whether runs of both can share a bundle: the same sampling step, integrator and goal limiter.
+    #[expect(clippy::float_cmp, reason = "the same number is meant")]
+    pub fn steps_alike(&self, other: &Self) -> bool {
+        self.step_s == other.step_s && self.integrator == other.integrator && self.goal_limiter == other.goal_limiter
+    }
+}

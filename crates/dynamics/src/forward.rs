@@ -1,18 +1,18 @@
 //! Articulated-body algorithm: the acceleration that a torque produces, in O(N) and without M.
 //!
-//! Everything is written in base axes about each link's own origin, so that the joint axis has no linear part and an articulated inertia
-//! moves to its parent by a shift alone. With `r` from the parent's origin to the link's, `(a; b)` the angular acceleration and the
-//! acceleration of the origin:
+//! Everything is written in each link's own folded axes about its origin, so that the joint axis is `(z; 0)` and `IA (z; 0)` is a column of IA. With p from
+//! the parent's origin to the link's, `(w; .)` the angular velocity, `(a; b)` the angular acceleration and the acceleration of the origin:
 //!
 //! ```text
-//! outward   z, w, I = R I R';  c = (w_p x z dq; w_p x (w_p x r));  p = (w x I w; w x (w x h))
-//! inward    U = IA (z; 0),  D = z . U_n + I_r,  u = tau - friction - z . p_n
-//!           Ia = IA - U U'/D,  pa = p + Ia c + U u/D,   parent += X' Ia X, X' pa
+//! outward   w = R' w_p + z dq,   c = (w x z dq; R' (w_p x (w_p x p))),   f = (w x I w; w x (w x h))
+//! inward    U = IA (z; 0),  D = z . U_n + I_r,  u = tau - friction - z . f_n
+//!           Ia = IA - U U'/D,  fa = f + Ia c + U u/D,   parent += X' Ia X, X' fa
 //! outward   A' = X A_p + c,  ddq = (u - U . A')/D,  A = A' + (z; 0) ddq
 //! ```
 //!
 //! | symbol | code | unit |
 //! |--------|------|------|
+//! | R | [`Passage`], `Rx(tilt) Rz(q + offset)` | 1 |
 //! | IA = [I H; H' M] | `Articulated`: 21 numbers | kg m^2, kg m, kg |
 //! | D | `1 / inverse` | kg m^2 |
 //! | I_r (+ extra) | rotor inertia, `armature` | kg m^2 |
@@ -21,16 +21,16 @@
 //! positive for every valid arm.
 
 use certune_linsys::{Joints, Real};
-use nalgebra::{Matrix3, Vector3};
 
 use crate::friction::friction_torque;
+use crate::local::{Body, M3, Passage, Turn, V3, apply, less_outer, sum};
 use crate::model::{Model, State};
-use crate::spatial::{Sym3, Twist, Wrench, apply, apply_transposed, cross, dot, product, turn_about_z};
+use crate::spatial::Sym3;
 
 /// Joint accelerations under `tau`: `M(q)^-1 (tau - C(q, dq) dq - g(q) - friction(dq))`, rotor inertia included in M.
 ///
 /// `tau` in N m, base to tip; returns rad/s^2, same order. O(N), no heap.
-#[inline]
+#[inline(always)]
 pub fn forward_dynamics<const N: usize, T: Real>(
     model: &Model<N, T>,
     at: &State<N, T>,
@@ -42,126 +42,137 @@ pub fn forward_dynamics<const N: usize, T: Real>(
 /// [`forward_dynamics`] with `M + diag(extra)` in place of M; `extra` in kg m^2, at least 0.
 ///
 /// With `extra = h d` and the friction torque of the old speed this is the step that treats viscous friction implicitly.
-#[inline]
+#[inline(always)]
 pub fn forward_dynamics_with_armature<const N: usize, T: Real>(
     model: &Model<N, T>,
     at: &State<N, T>,
     tau: &Joints<N, T>,
     extra_kg_m2: &Joints<N, T>,
 ) -> Joints<N, T> {
-    articulated_body(model, at, tau, &(model.rotor_inertia + extra_kg_m2))
+    let mut armature = model.rotor_inertia;
+    for i in 0..N {
+        armature[i] += extra_kg_m2[i];
+    }
+    articulated_body(model, at, tau, &armature)
 }
 
 /// A symmetric 6x6 inertia in blocks: moment = I a + H b, force = H' a + M b.
 #[derive(Clone, Copy)]
 struct Articulated<T: Real> {
     rotational: Sym3<T>,
-    coupling: Matrix3<T>,
+    coupling: M3<T>,
     translational: Sym3<T>,
+}
+
+/// Moment about the link's origin and force.
+#[derive(Clone, Copy)]
+struct Wrench<T: Real> {
+    moment: V3<T>,
+    force: V3<T>,
 }
 
 /// What a joint leaves behind on the way in, for the way out.
 #[derive(Clone, Copy)]
 struct JointShare<T: Real> {
-    axis: Vector3<T>,
-    shift: Vector3<T>,
-    bias: Twist<T>,
-    u_moment: Vector3<T>,
-    u_force: Vector3<T>,
+    passage: Passage<T>,
+    /// c: x and y of the angular part, whose z is 0, and the linear part.
+    bias: [T; 2],
+    bias_linear: V3<T>,
+    u_moment: V3<T>,
+    u_force: V3<T>,
     inverse: T,
     torque: T,
 }
 
-/// `â S`: the vector product with each column of a symmetric matrix.
-#[inline]
-fn cross_sym<T: Real>(a: &Vector3<T>, s: &Sym3<T>) -> Matrix3<T> {
-    Matrix3::new(
-        a.y * s.xz - a.z * s.xy,
-        a.y * s.yz - a.z * s.yy,
-        a.y * s.zz - a.z * s.yz,
-        a.z * s.xx - a.x * s.xz,
-        a.z * s.xy - a.x * s.yz,
-        a.z * s.xz - a.x * s.zz,
-        a.x * s.xy - a.y * s.xx,
-        a.x * s.yy - a.y * s.xy,
-        a.x * s.yz - a.y * s.xz,
-    )
-}
-
 impl<T: Real> Articulated<T> {
-    #[inline]
-    fn zero() -> Self {
-        Self { rotational: Sym3::zero(), coupling: Matrix3::zeros(), translational: Sym3::zero() }
-    }
-
-    #[inline]
-    fn plus(&self, b: &Self) -> Self {
+    /// Of a rigid body.
+    #[inline(always)]
+    fn rigid(body: &Body<T>) -> Self {
+        let (m, o) = (body.mass, T::zero());
         Self {
-            rotational: self.rotational.plus(&b.rotational),
-            coupling: self.coupling + b.coupling,
-            translational: self.translational.plus(&b.translational),
+            rotational: body.about_origin,
+            coupling: M3::skew(&body.first_moment),
+            translational: Sym3 { xx: m, yy: m, zz: m, xy: o, xz: o, yz: o },
         }
     }
 
-    #[inline]
-    fn apply(&self, b: &Twist<T>) -> Wrench<T> {
-        Wrench {
-            moment: self.rotational.apply(&b.angular) + apply(&self.coupling, &b.linear),
-            force: apply_transposed(&self.coupling, &b.angular) + self.translational.apply(&b.linear),
+    /// With a rigid body added.
+    #[inline(always)]
+    fn plus_rigid(&self, body: &Body<T>) -> Self {
+        let (h, m, t) = (&body.first_moment, body.mass, &self.translational);
+        let [x, y, z] = &self.coupling.rows;
+        Self {
+            rotational: sum(&self.rotational, &body.about_origin),
+            coupling: M3 {
+                rows: [
+                    V3 { x: x.x, y: x.y - h.z, z: x.z + h.y },
+                    V3 { x: y.x + h.z, y: y.y, z: y.z - h.x },
+                    V3 { x: z.x - h.y, y: z.y + h.x, z: z.z },
+                ],
+            },
+            translational: Sym3 { xx: t.xx + m, yy: t.yy + m, zz: t.zz + m, ..*t },
         }
     }
 
     /// `self - s (n; f)(n; f)'`.
-    #[inline]
-    fn minus_outer(&self, n: &Vector3<T>, f: &Vector3<T>, s: T) -> Self {
-        let g = f * s;
-        let h = &self.coupling;
+    #[inline(always)]
+    fn less_outer(&self, n: &V3<T>, f: &V3<T>, s: T) -> Self {
+        let (sn, sf) = (*n * s, *f * s);
         Self {
-            rotational: self.rotational.minus_outer(n, s),
-            coupling: Matrix3::new(
-                h.m11 - n.x * g.x,
-                h.m12 - n.x * g.y,
-                h.m13 - n.x * g.z,
-                h.m21 - n.y * g.x,
-                h.m22 - n.y * g.y,
-                h.m23 - n.y * g.z,
-                h.m31 - n.z * g.x,
-                h.m32 - n.z * g.y,
-                h.m33 - n.z * g.z,
-            ),
-            translational: self.translational.minus_outer(f, s),
+            rotational: less_outer(&self.rotational, n, &sn),
+            coupling: self.coupling.less_outer(n, &sf),
+            translational: less_outer(&self.translational, f, &sf),
         }
     }
 
-    /// About a point from which this one's is reached by `r`.
+    /// The wrench of an acceleration whose angular part has no z.
+    #[inline(always)]
+    fn apply(&self, [x, y]: [T; 2], linear: &V3<T>) -> Wrench<T> {
+        let angular = V3 { x, y, z: T::zero() };
+        let (i, [row_x, row_y, _]) = (&self.rotational, &self.coupling.rows);
+        let column = |a: T, b: T| a.mul_add(x, b * y);
+        let turned = V3 { x: column(i.xx, i.xy), y: column(i.xy, i.yy), z: column(i.xz, i.yz) };
+        let pushed = row_x.scaled_plus(angular.x, &(*row_y * angular.y));
+        Wrench { moment: turned + self.coupling.apply(linear), force: pushed + apply(&self.translational, linear) }
+    }
+
+    /// In the parent's axes, about the parent's origin, from which this one's is reached by `p`.
     ///
-    /// `H' = H + r̂ M`, `I' = I + Y + Y'` with `Y = r̂ (H + r̂ M / 2)'`.
-    #[inline]
-    fn shifted(&self, r: &Vector3<T>) -> Self {
-        let added = cross_sym(r, &self.translational);
-        let half = self.coupling + added * T::from_f64(0.5);
-        // Columns of Y are r x (rows of `half`).
-        let (y1, y2, y3) = (
-            cross(r, &Vector3::new(half.m11, half.m12, half.m13)),
-            cross(r, &Vector3::new(half.m21, half.m22, half.m23)),
-            cross(r, &Vector3::new(half.m31, half.m32, half.m33)),
+    /// `H' = H + p^ M`, `I' = I + Y + Y'` with `Y = p^ (H + p^ M / 2)'`.
+    #[inline(always)]
+    fn to_parent(self, passage: Passage<T>, p: &V3<T>) -> Self {
+        let i = passage.symmetric_to_parent(&self.rotational);
+        let m = passage.symmetric_to_parent(&self.translational);
+        let h = passage.matrix_to_parent(&self.coupling);
+        // Columns of p^ M are p x (columns of M), M being symmetric.
+        let (a, b, c) = (
+            p.cross(&V3 { x: m.xx, y: m.xy, z: m.xz }),
+            p.cross(&V3 { x: m.xy, y: m.yy, z: m.yz }),
+            p.cross(&V3 { x: m.xz, y: m.yz, z: m.zz }),
         );
-        let i = &self.rotational;
+        let added =
+            M3 { rows: [V3 { x: a.x, y: b.x, z: c.x }, V3 { x: a.y, y: b.y, z: c.y }, V3 { x: a.z, y: b.z, z: c.z }] };
+        let half = T::from_f64(0.5);
+        // Columns of Y are p x (rows of H + p^ M / 2).
+        let row_x = p.cross(&added.rows[0].scaled_plus(half, &h.rows[0]));
+        let row_y = p.cross(&added.rows[1].scaled_plus(half, &h.rows[1]));
+        let row_z = p.cross(&added.rows[2].scaled_plus(half, &h.rows[2]));
         Self {
             rotational: Sym3 {
-                xx: i.xx + y1.x + y1.x,
-                yy: i.yy + y2.y + y2.y,
-                zz: i.zz + y3.z + y3.z,
-                xy: i.xy + y2.x + y1.y,
-                xz: i.xz + y3.x + y1.z,
-                yz: i.yz + y3.y + y2.z,
+                xx: i.xx + (row_x.x + row_x.x),
+                yy: i.yy + (row_y.y + row_y.y),
+                zz: i.zz + (row_z.z + row_z.z),
+                xy: i.xy + (row_y.x + row_x.y),
+                xz: i.xz + (row_z.x + row_x.z),
+                yz: i.yz + (row_z.y + row_y.z),
             },
-            coupling: self.coupling + added,
-            translational: self.translational,
+            coupling: h.plus(&added),
+            translational: m,
         }
     }
 }
 
+#[inline(always)]
 fn articulated_body<const N: usize, T: Real>(
     model: &Model<N, T>,
     at: &State<N, T>,
@@ -169,68 +180,79 @@ fn articulated_body<const N: usize, T: Real>(
     armature: &Joints<N, T>,
 ) -> Joints<N, T> {
     let o = T::zero();
-    let zero = Vector3::zeros();
+    let zero = V3::zero();
+    let none = Wrench { moment: zero, force: zero };
+    let still = Turn { sin: o, cos: o };
     let friction = friction_torque(model, &at.dq);
-    let mut inertia = [Articulated::zero(); N];
-    let mut wrench = [Wrench::zero(); N];
+    let mut wrench = [none; N];
     let mut joint = [JointShare {
-        axis: zero,
-        shift: zero,
-        bias: Twist::zero(),
+        passage: Passage { tilt: still, turn: still },
+        bias: [o; 2],
+        bias_linear: zero,
         u_moment: zero,
         u_force: zero,
         inverse: o,
         torque: o,
     }; N];
 
-    let mut rotation = Matrix3::identity();
     let mut w = zero;
-    for (i, link) in model.links.iter().enumerate() {
-        let (sin, cos) = at.q[i].sin_cos();
-        let r = apply(&rotation, &link.position);
-        rotation = turn_about_z(&product(&rotation, &link.rotation), sin, cos);
-        let z = Vector3::new(rotation.m13, rotation.m23, rotation.m33);
-        let turn = z * at.dq[i];
-        joint[i].axis = z;
-        joint[i].shift = r;
-        joint[i].bias = Twist { angular: cross(&w, &turn), linear: cross(&w, &cross(&w, &r)) };
-        w += turn;
-        let h = apply(&rotation, &link.body.first_moment);
-        let rotational = link.body.about_origin.rotated(&rotation);
-        wrench[i] = Wrench { moment: cross(&w, &rotational.apply(&w)), force: cross(&w, &cross(&w, &h)) };
-        inertia[i] = Articulated {
-            rotational,
-            coupling: Matrix3::new(o, -h.z, h.y, h.z, o, -h.x, -h.y, h.x, o),
-            translational: Sym3::from_diagonal(link.body.mass),
-        };
+    for i in 0..N {
+        let (hinge, dq) = (&model.chain[i], at.dq[i]);
+        let (sin, cos) = (at.q[i] + hinge.offset).sin_cos();
+        let passage = Passage { tilt: hinge.tilt(), turn: Turn { sin, cos } };
+        let p = V3::of(&hinge.position);
+        joint[i].passage = passage;
+        joint[i].bias_linear = passage.to_child(&w.cross(&w.cross(&p)));
+        w = passage.to_child(&w);
+        joint[i].bias = [w.y * dq, -(w.x * dq)];
+        w.z += dq;
+        let body = Body::of(&hinge.body);
+        wrench[i] =
+            Wrench { moment: w.cross(&apply(&body.about_origin, &w)), force: w.cross(&w.cross(&body.first_moment)) };
     }
 
+    // What hangs on the joint at hand.
+    let mut beyond: Option<(Articulated<T>, Wrench<T>)> = None;
     for i in (0..N).rev() {
+        let hinge = &model.chain[i];
+        let body = Body::of(&hinge.body);
         let share = &mut joint[i];
-        let z = &share.axis;
-        let u_moment = inertia[i].rotational.apply(z);
-        let u_force = apply_transposed(&inertia[i].coupling, z);
-        let inverse = T::one() / (dot(z, &u_moment) + armature[i]);
-        let torque = tau[i] - friction[i] - dot(z, &wrench[i].moment);
+        let (inertia, force) = match &beyond {
+            None => (Articulated::rigid(&body), wrench[i]),
+            Some((inertia, more)) => (
+                inertia.plus_rigid(&body),
+                Wrench { moment: wrench[i].moment + more.moment, force: wrench[i].force + more.force },
+            ),
+        };
+        let turned = &inertia.rotational;
+        let u_moment = V3 { x: turned.xz, y: turned.yz, z: turned.zz };
+        let u_force = inertia.coupling.rows[2];
+        let inverse = T::one() / (turned.zz + armature[i]);
+        let torque = tau[i] - friction[i] - force.moment.z;
         (share.u_moment, share.u_force, share.inverse, share.torque) = (u_moment, u_force, inverse, torque);
         if i > 0 {
-            let rest = inertia[i].minus_outer(&u_moment, &u_force, inverse);
-            let push = rest.apply(&share.bias);
+            let p = V3::of(&hinge.position);
+            let rest = inertia.less_outer(&u_moment, &u_force, inverse);
+            let push = rest.apply(share.bias, &share.bias_linear);
             let gain = torque * inverse;
-            let force = wrench[i].force + push.force + u_force * gain;
-            let moment = wrench[i].moment + push.moment + u_moment * gain + cross(&share.shift, &force);
-            inertia[i - 1] = inertia[i - 1].plus(&rest.shifted(&share.shift));
-            wrench[i - 1] = wrench[i - 1].plus(&Wrench { moment, force });
+            let moment = u_moment.scaled_plus(gain, &(force.moment + push.moment));
+            let passed = share.passage.to_parent(&u_force.scaled_plus(gain, &(force.force + push.force)));
+            let moment = share.passage.to_parent(&moment) + p.cross(&passed);
+            beyond = Some((rest.to_parent(share.passage, &p), Wrench { moment, force: passed }));
         }
     }
 
     let mut ddq = Joints::<N, T>::zeros();
-    let (mut dw, mut a) = (zero, -model.gravity);
-    for (i, share) in joint.iter().enumerate() {
-        a += cross(&dw, &share.shift) + share.bias.linear;
-        dw += share.bias.angular;
-        ddq[i] = (share.torque - dot(&share.u_moment, &dw) - dot(&share.u_force, &a)) * share.inverse;
-        dw += share.axis * ddq[i];
+    let (mut dw, mut a) = (zero, -V3::of(&model.folded_gravity));
+    for i in 0..N {
+        let share = &joint[i];
+        let p = V3::of(&model.chain[i].position);
+        a = share.passage.to_child(&(a + dw.cross(&p))) + share.bias_linear;
+        dw = share.passage.to_child(&dw);
+        dw.x += share.bias[0];
+        dw.y += share.bias[1];
+        ddq[i] = (share.torque - share.u_moment.dot(&dw) - share.u_force.dot(&a)) * share.inverse;
+        dw.z += ddq[i];
     }
     ddq
 }

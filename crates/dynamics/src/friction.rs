@@ -19,16 +19,18 @@ use crate::model::Model;
 pub const COULOMB_SPEED_RAD_PER_S: f64 = 0.01;
 
 /// Friction torque `d dq + f_c tanh(dq / 0.01)`, N m, for `dq` in rad/s; it opposes `dq` when subtracted from the motor's torque.
-#[inline]
+#[inline(always)]
 pub fn friction_torque<const N: usize, T: Real>(model: &Model<N, T>, dq: &Joints<N, T>) -> Joints<N, T> {
     let per_speed = T::from_f64(COULOMB_SPEED_RAD_PER_S.recip());
-    Joints::from_fn(|i, _| model.viscous[i] * dq[i] + coulomb(model, i, dq[i] * per_speed))
-}
-
-#[inline]
-fn coulomb<const N: usize, T: Real>(model: &Model<N, T>, joint: usize, speed: T) -> T {
-    // An arm without Coulomb friction shall not pay for N hyperbolic tangents in each step; lanes that compare equal to zero are all zero.
-    if model.coulomb[joint].is_zero() { T::zero() } else { model.coulomb[joint] * speed.tanh() }
+    let mut torque = *dq;
+    for i in 0..N {
+        torque[i] = model.viscous[i] * dq[i];
+        // An arm without Coulomb friction shall not pay for N hyperbolic tangents in each step.
+        if model.has_coulomb_friction {
+            torque[i] += model.coulomb[i] * (dq[i] * per_speed).tanh();
+        }
+    }
+    torque
 }
 
 /// Slope of [`friction_torque`]: `d + f_c (1 - tanh^2(dq / 0.01)) / 0.01` per joint, N m s/rad.

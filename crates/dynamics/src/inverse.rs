@@ -1,6 +1,6 @@
 //! Recursive Newton-Euler: the torque that produces a given acceleration.
 //!
-//! Outward, in each link's own frame, with E = (R0 Rz(q))' and the acceleration a of the link's origin (gravity enters as `a_0 = -a_g`):
+//! Outward, in each link's own folded axes, with E = (Rx(tilt) Rz(q + offset))' and the acceleration a of the link's origin (gravity enters as `a_0 = -a_g`):
 //!
 //! ```text
 //! w_i  = E w + z dq_i
@@ -16,26 +16,27 @@
 //! |--------|------|------|
 //! | w, dw, a | `velocity`, `acceleration` | rad/s, rad/s^2, m/s^2 |
 //! | m, h, I | `body` | kg, kg m, kg m^2 |
-//! | n, f | [`Wrench`] about the link's origin | N m, N |
+//! | n, f | `wrench` about the link's origin | N m, N |
 //!
 //! Source: Luh, Walker & Paul (1980); Featherstone 2008, ch. 5. Limits: fixed base, revolute joints.
 
 use certune_linsys::{Joints, Real};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
 use crate::friction::friction_torque;
+use crate::local::{Body, Passage, Turn, V3, apply};
 use crate::model::{Model, State};
-use crate::spatial::{Wrench, apply, apply_transposed, cross, turn_about_z};
 
 /// Joint torques that produce `ddq`: `tau = M(q) ddq + C(q, dq) dq + g(q) + friction(dq)`, rotor inertia included.
 ///
 /// `ddq` in rad/s^2, base to tip; returns `tau` in N m, same order. Cannot fail: a `Model` is valid by construction. O(N), no heap.
+#[inline(always)]
 pub fn inverse_dynamics<const N: usize, T: Real>(
     model: &Model<N, T>,
     at: &State<N, T>,
     ddq: &Joints<N, T>,
 ) -> Joints<N, T> {
-    let mut tau = newton_euler(model, &at.q, &at.dq, ddq, &-model.gravity);
+    let mut tau = newton_euler(model, &at.q, &at.dq, ddq, &-model.folded_gravity);
     let friction = friction_torque(model, &at.dq);
     for i in 0..N {
         tau[i] += model.rotor_inertia[i] * ddq[i] + friction[i];
@@ -43,7 +44,8 @@ pub fn inverse_dynamics<const N: usize, T: Real>(
     tau
 }
 
-/// The rigid links' share: neither rotors nor friction; `upward` is the acceleration of the base.
+/// The rigid links' share: neither rotors nor friction; `upward` is the acceleration of the base in its folded axes.
+#[inline(always)]
 pub(crate) fn newton_euler<const N: usize, T: Real>(
     model: &Model<N, T>,
     q: &Joints<N, T>,
@@ -51,35 +53,38 @@ pub(crate) fn newton_euler<const N: usize, T: Real>(
     ddq: &Joints<N, T>,
     upward: &Vector3<T>,
 ) -> Joints<N, T> {
-    let mut rotation = [Matrix3::zeros(); N];
-    let mut wrench = [Wrench::zero(); N];
-    let (mut w, mut dw, mut a) = (Vector3::zeros(), Vector3::zeros(), *upward);
-    for (i, link) in model.links.iter().enumerate() {
-        let (sin, cos) = q[i].sin_cos();
-        let r = turn_about_z(&link.rotation, sin, cos);
-        let p = &link.position;
-        a = apply_transposed(&r, &(a + cross(&dw, p) + cross(&w, &cross(&w, p))));
-        w = apply_transposed(&r, &w);
-        dw = apply_transposed(&r, &dw);
+    let (o, zero) = (T::zero(), V3::zero());
+    let still = Turn { sin: o, cos: o };
+    let mut passage = [Passage { tilt: still, turn: still }; N];
+    let mut wrench = [[zero; 2]; N];
+    let (mut w, mut dw, mut a) = (zero, zero, V3::of(upward));
+    for i in 0..N {
+        let hinge = &model.chain[i];
+        let (sin, cos) = (q[i] + hinge.offset).sin_cos();
+        let (here, p) = (Passage { tilt: hinge.tilt(), turn: Turn { sin, cos } }, V3::of(&hinge.position));
+        a = here.to_child(&(a + dw.cross(&p) + w.cross(&w.cross(&p))));
+        w = here.to_child(&w);
+        dw = here.to_child(&dw);
         // (E w) x z dq
-        dw.x += w.y * dq[i];
-        dw.y -= w.x * dq[i];
+        dw.x = w.y.mul_add(dq[i], dw.x);
+        dw.y = (-w.x).mul_add(dq[i], dw.y);
         dw.z += ddq[i];
         w.z += dq[i];
-        let (h, inertia) = (&link.body.first_moment, &link.body.about_origin);
-        wrench[i] = Wrench {
-            moment: inertia.apply(&dw) + cross(h, &a) + cross(&w, &inertia.apply(&w)),
-            force: a * link.body.mass + cross(&dw, h) + cross(&w, &cross(&w, h)),
-        };
-        rotation[i] = r;
+        let Body { mass, first_moment: h, about_origin: inertia } = Body::of(&hinge.body);
+        let moment = apply(&inertia, &dw) + h.cross(&a) + w.cross(&apply(&inertia, &w));
+        let force = a.scaled_plus(mass, &(dw.cross(&h) + w.cross(&w.cross(&h))));
+        wrench[i] = [moment, force];
+        passage[i] = here;
     }
     let mut tau = Joints::<N, T>::zeros();
     for i in (0..N).rev() {
-        tau[i] = wrench[i].moment.z;
+        let [moment, force] = wrench[i];
+        tau[i] = moment.z;
         if i > 0 {
-            let force = apply(&rotation[i], &wrench[i].force);
-            let moment = apply(&rotation[i], &wrench[i].moment) + cross(&model.links[i].position, &force);
-            wrench[i - 1] = wrench[i - 1].plus(&Wrench { moment, force });
+            let force = passage[i].to_parent(&force);
+            let moment = passage[i].to_parent(&moment) + V3::of(&model.chain[i].position).cross(&force);
+            let [sum_moment, sum_force] = &mut wrench[i - 1];
+            (*sum_moment, *sum_force) = (*sum_moment + moment, *sum_force + force);
         }
     }
     tau

@@ -13,6 +13,7 @@ use certune_linsys::{Joints, Real};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::error::RobotError;
+use crate::folded::{Hinge, folded, folded_base};
 use crate::robot::{Payload, Robot};
 use crate::spatial::{BodyInertia, Sym3};
 
@@ -33,10 +34,16 @@ pub(crate) struct CompiledLink<T: Real> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model<const N: usize, T: Real = f64> {
     pub(crate) links: [CompiledLink<T>; N],
+    /// The same links with the constant rotations folded away; what the O(N) recursions read.
+    pub(crate) chain: [Hinge<T>; N],
     pub(crate) gravity: Vector3<T>,
+    /// Gravity in the base's folded axes.
+    pub(crate) folded_gravity: Vector3<T>,
     pub(crate) rotor_inertia: Joints<N, T>,
     pub(crate) viscous: Joints<N, T>,
     pub(crate) coulomb: Joints<N, T>,
+    /// Whether any lane of any joint has Coulomb friction.
+    pub(crate) has_coulomb_friction: bool,
     pub(crate) flange_rotation: Matrix3<T>,
     pub(crate) flange_position: Vector3<T>,
 }
@@ -83,16 +90,20 @@ impl<const N: usize> Model<N> {
             joints: robot.joints(),
             expected: N,
         })?;
+        let links = core::array::from_fn(|i| CompiledLink {
+            rotation: data[i].frame.rotation_matrix(),
+            position: data[i].frame.position(),
+            body: data[i].inertia.compiled(),
+        });
         Ok(Self {
-            links: core::array::from_fn(|i| CompiledLink {
-                rotation: data[i].frame.rotation_matrix(),
-                position: data[i].frame.position(),
-                body: data[i].inertia.compiled(),
-            }),
+            chain: folded(&links),
             gravity: robot.gravity_m_per_s2().into(),
+            folded_gravity: folded_base(&links, &robot.gravity_m_per_s2().into()),
+            links,
             rotor_inertia: Joints::from_fn(|i, _| data[i].rotor_inertia_kg_m2),
             viscous: Joints::from_fn(|i, _| data[i].viscous_n_m_s_per_rad),
             coulomb: Joints::from_fn(|i, _| data[i].coulomb_n_m),
+            has_coulomb_friction: data.iter().any(|link| link.coulomb_n_m > 0.0),
             flange_rotation: robot.flange().rotation_matrix(),
             flange_position: robot.flange().position(),
         })
@@ -113,6 +124,7 @@ impl<const N: usize> Model<N> {
                 about_origin: body.about_origin.scaled(s),
             };
         }
+        scaled.chain = folded(&scaled.links);
         scaled
     }
 
@@ -123,6 +135,7 @@ impl<const N: usize> Model<N> {
         if let Some(last) = loaded.links.last_mut() {
             last.body = last.body.plus(&payload.inertia().compiled());
         }
+        loaded.chain = folded(&loaded.links);
         loaded
     }
 
@@ -135,13 +148,15 @@ impl<const N: usize> Model<N> {
     /// The same arm with this friction, N m s/rad and N m, each finite and at least 0 (the robot's own is replaced).
     #[must_use]
     pub fn with_friction(&self, viscous_n_m_s_per_rad: &Joints<N>, coulomb_n_m: &Joints<N>) -> Self {
-        Self { viscous: *viscous_n_m_s_per_rad, coulomb: *coulomb_n_m, ..self.clone() }
+        let has_coulomb_friction = coulomb_n_m.iter().any(|friction| *friction > 0.0);
+        Self { viscous: *viscous_n_m_s_per_rad, coulomb: *coulomb_n_m, has_coulomb_friction, ..self.clone() }
     }
 
     /// The same arm under another gravity, m/s^2 in the base frame.
     #[must_use]
     pub fn with_gravity(&self, gravity_m_per_s2: [f64; 3]) -> Self {
-        Self { gravity: gravity_m_per_s2.into(), ..self.clone() }
+        let gravity = gravity_m_per_s2.into();
+        Self { gravity, folded_gravity: folded_base(&self.links, &gravity), ..self.clone() }
     }
 
     /// Mass of each link, payload included, kg.
@@ -182,27 +197,36 @@ impl<const N: usize, T: Real> Model<N, T> {
         let vector = |get: &dyn Fn(&Model<N>) -> Vector3<f64>| Vector3::from_fn(|r, _| number(&|arm| get(arm)[r]));
         let matrix = |get: &dyn Fn(&Model<N>) -> Matrix3<f64>| Matrix3::from_fn(|r, c| number(&|arm| get(arm)[(r, c)]));
         let joints = |get: &dyn Fn(&Model<N>) -> Joints<N>| Joints::from_fn(|r, _| number(&|arm| get(arm)[r]));
+        let body = |get: &dyn Fn(&Model<N>) -> BodyInertia<f64>| BodyInertia {
+            mass: number(&|arm| get(arm).mass),
+            first_moment: vector(&|arm| get(arm).first_moment),
+            about_origin: Sym3 {
+                xx: number(&|arm| get(arm).about_origin.xx),
+                yy: number(&|arm| get(arm).about_origin.yy),
+                zz: number(&|arm| get(arm).about_origin.zz),
+                xy: number(&|arm| get(arm).about_origin.xy),
+                xz: number(&|arm| get(arm).about_origin.xz),
+                yz: number(&|arm| get(arm).about_origin.yz),
+            },
+        };
         Self {
+            chain: core::array::from_fn(|i| Hinge {
+                tilt: [0, 1].map(|k| number(&|arm| arm.chain[i].tilt[k])),
+                offset: number(&|arm| arm.chain[i].offset),
+                position: vector(&|arm| arm.chain[i].position),
+                body: body(&|arm| arm.chain[i].body),
+            }),
             links: core::array::from_fn(|i| CompiledLink {
                 rotation: matrix(&|arm| arm.links[i].rotation),
                 position: vector(&|arm| arm.links[i].position),
-                body: BodyInertia {
-                    mass: number(&|arm| arm.links[i].body.mass),
-                    first_moment: vector(&|arm| arm.links[i].body.first_moment),
-                    about_origin: Sym3 {
-                        xx: number(&|arm| arm.links[i].body.about_origin.xx),
-                        yy: number(&|arm| arm.links[i].body.about_origin.yy),
-                        zz: number(&|arm| arm.links[i].body.about_origin.zz),
-                        xy: number(&|arm| arm.links[i].body.about_origin.xy),
-                        xz: number(&|arm| arm.links[i].body.about_origin.xz),
-                        yz: number(&|arm| arm.links[i].body.about_origin.yz),
-                    },
-                },
+                body: body(&|arm| arm.links[i].body),
             }),
             gravity: vector(&|arm| arm.gravity),
+            folded_gravity: vector(&|arm| arm.folded_gravity),
             rotor_inertia: joints(&|arm| arm.rotor_inertia),
             viscous: joints(&|arm| arm.viscous),
             coulomb: joints(&|arm| arm.coulomb),
+            has_coulomb_friction: arms.iter().any(|arm| arm.has_coulomb_friction),
             flange_rotation: matrix(&|arm| arm.flange_rotation),
             flange_position: vector(&|arm| arm.flange_position),
         }

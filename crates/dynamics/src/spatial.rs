@@ -83,17 +83,6 @@ pub(crate) struct Sym3<T> {
 
 impl<T: Real> Sym3<T> {
     #[inline]
-    pub(crate) fn zero() -> Self {
-        let o = T::zero();
-        Self { xx: o, yy: o, zz: o, xy: o, xz: o, yz: o }
-    }
-
-    #[inline]
-    pub(crate) fn from_diagonal(d: T) -> Self {
-        Self { xx: d, yy: d, zz: d, ..Self::zero() }
-    }
-
-    #[inline]
     pub(crate) fn apply(&self, b: &Vector3<T>) -> Vector3<T> {
         Vector3::new(
             self.xx * b.x + self.xy * b.y + self.xz * b.z,
@@ -122,20 +111,6 @@ impl<T: Real> Sym3<T> {
     #[inline]
     pub(crate) fn trace(&self) -> T {
         self.xx + self.yy + self.zz
-    }
-
-    /// `self - s a a'`.
-    #[inline]
-    pub(crate) fn minus_outer(&self, a: &Vector3<T>, s: T) -> Self {
-        let b = Vector3::new(a.x * s, a.y * s, a.z * s);
-        Self {
-            xx: self.xx - a.x * b.x,
-            yy: self.yy - a.y * b.y,
-            zz: self.zz - a.z * b.z,
-            xy: self.xy - a.x * b.y,
-            xz: self.xz - a.x * b.z,
-            yz: self.yz - a.y * b.z,
-        }
     }
 
     #[inline]

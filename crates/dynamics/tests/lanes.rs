@@ -62,7 +62,8 @@ impl Real for Pair {
         Self([x; 2])
     }
     fn sin_cos(self) -> (Self, Self) {
-        (self.map(f64::sin), self.map(f64::cos))
+        let [a, b] = self.0.map(Real::sin_cos);
+        (Self([a.0, b.0]), Self([a.1, b.1]))
     }
     fn sqrt(self) -> Self {
         self.map(f64::sqrt)

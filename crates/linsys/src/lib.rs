@@ -10,7 +10,8 @@
 mod scalar;
 #[cfg(feature = "std")]
 mod spectrum;
+pub mod trig;
 
-pub use scalar::{JointMatrix, Joints, Real};
+pub use scalar::{JointMatrix, Joints, Lanes, Real};
 #[cfg(feature = "std")]
 pub use spectrum::{Continuous, Discrete, Loop, LoopError, TimeDomain};

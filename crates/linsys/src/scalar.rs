@@ -6,6 +6,8 @@ use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAss
 use nalgebra::{SMatrix, SVector};
 use num_traits::{Float, One, Zero};
 
+use crate::trig;
+
 /// A real number as the recursions see it: the four operations, a square root, an angle's sine and cosine.
 ///
 /// `f64` is the scalar of a single arm. A bundle of lanes, or a scalar that counts its operations, implements the same
@@ -31,6 +33,11 @@ pub trait Real:
 {
     /// The number nearest to `x`, the same in every lane.
     fn from_f64(x: f64) -> Self;
+    /// `self factor + addend`, in one rounding where the machine has an instruction for it.
+    #[inline(always)]
+    fn mul_add(self, factor: Self, addend: Self) -> Self {
+        self * factor + addend
+    }
     /// `(sin x, cos x)`, x in rad.
     fn sin_cos(self) -> (Self, Self);
     /// The square root of a non-negative number.
@@ -45,6 +52,28 @@ pub trait Real:
     fn choose(self, bound: Self, then: Self, otherwise: Self) -> Self;
 }
 
+/// Numbers side by side that are computed together, each as if it were alone.
+pub trait Lanes: Real {
+    /// How many.
+    const LANES: usize;
+    /// The numbers `of(0), of(1), ..`.
+    fn from_lanes(of: impl FnMut(usize) -> f64) -> Self;
+    /// The number in a lane, `lane < LANES`.
+    fn lane(&self, lane: usize) -> f64;
+}
+
+impl Lanes for f64 {
+    const LANES: usize = 1;
+    #[inline(always)]
+    fn from_lanes(mut of: impl FnMut(usize) -> f64) -> Self {
+        of(0)
+    }
+    #[inline(always)]
+    fn lane(&self, _: usize) -> f64 {
+        *self
+    }
+}
+
 impl Real for f64 {
     #[inline]
     fn from_f64(x: f64) -> Self {
@@ -52,7 +81,7 @@ impl Real for f64 {
     }
     #[inline]
     fn sin_cos(self) -> (Self, Self) {
-        Float::sin_cos(self)
+        if Float::abs(self) <= trig::LIMIT_RAD { trig::sin_cos(self) } else { Float::sin_cos(self) }
     }
     #[inline]
     fn sqrt(self) -> Self {

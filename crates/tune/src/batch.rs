@@ -7,9 +7,10 @@
 
 use core::ops::Range;
 
-use certune_closed_loop::{KeyError, NoiseStream, Plant, PlantError, Scenario, Task, simulate};
-use certune_control::aic::{Aic, AicParams};
+use certune_closed_loop::{KeyError, NoiseStream, Plant, PlantError, Run, Scenario, Task, simulate_many};
+use certune_control::aic::AicParams;
 use certune_dynamics::Robot;
+use certune_simd::InstructionSet;
 use rayon::prelude::*;
 
 use crate::filter::StabilityFilter;
@@ -93,16 +94,17 @@ impl<const N: usize> Batch<N> {
 
     /// One run on each plant. Costs one simulation of the scenario per plant.
     pub fn run(&self, params: &AicParams<N>) -> Vec<PlantResult> {
-        let controller = Aic::<N>::new(params);
+        // As many plants at a time as run side by side.
         self.plants
-            .par_iter()
-            .map(|(index, plant)| {
-                let metrics = simulate(plant, &self.task, &controller, self.noise(*index), &mut ());
-                PlantResult {
+            .par_chunks(InstructionSet::widest().lanes())
+            .flat_map_iter(|plants| {
+                let run = |(index, plant)| (Run { plant, task: &self.task, noise: self.noise(*index) }, params);
+                let runs: Vec<_> = plants.iter().map(|(index, plant)| run((index, plant))).collect();
+                simulate_many(&runs).into_iter().zip(plants).map(|(metrics, (index, _))| PlantResult {
                     plant: *index,
                     outcome: score::of_run(&metrics, &self.start_rad, self.task.step_s),
                     figures: score::figures(&metrics),
-                }
+                })
             })
             .collect()
     }

@@ -4,15 +4,16 @@ use std::fs;
 use std::path::Path;
 
 /// Crate, the crates of ours it may import, and outside crates it must never import.
-const IMPORTS: [(&str, &[&str], &[&str]); 12] = [
+const IMPORTS: [(&str, &[&str], &[&str]); 13] = [
     ("linsys", &[], &["clarabel", "argmin", "rand"]),
+    ("simd", &["linsys"], &["clarabel", "argmin", "rand", "rand_chacha"]),
     ("dynamics", &["linsys"], &["clarabel", "argmin", "rand", "rand_chacha"]),
     ("control", &["linsys"], &["clarabel", "argmin", "rand", "rand_chacha"]),
-    ("closed-loop", &["linsys", "dynamics", "control"], &["clarabel", "argmin"]),
+    ("closed-loop", &["linsys", "simd", "dynamics", "control"], &["clarabel", "argmin"]),
     ("verify", &[], &["clarabel", "argmin", "nalgebra", "rand", "faer"]),
     ("bounds", &["linsys", "dynamics", "verify"], &["clarabel", "argmin", "rand", "rand_chacha"]),
     ("certify", &["linsys", "verify", "lapack"], &["argmin", "rand"]),
-    ("tune", &["linsys", "dynamics", "control", "closed-loop", "certify"], &["minijinja", "plotters", "clap"]),
+    ("tune", &["linsys", "simd", "dynamics", "control", "closed-loop", "certify"], &["minijinja", "plotters", "clap"]),
     ("report", &[], &["nalgebra", "clarabel", "argmin"]),
     ("lapack", &[], &["clarabel", "nalgebra"]),
     ("testkit", &["linsys", "dynamics", "control"], &["clarabel", "argmin"]),

@@ -97,9 +97,9 @@ pub(crate) struct Ladder {
 impl Ladder {
     pub fn of(effort: Effort) -> Self {
         match effort {
-            Effort::Quick => Self { budget: 40_000, ratios: &[3.0, 1.6, 1.25, 1.1, 1.03] },
-            Effort::Standard => Self { budget: 400_000, ratios: &[3.0, 1.6, 1.25, 1.1, 1.04] },
-            Effort::Thorough => Self { budget: 4_000_000, ratios: &[3.0, 1.6, 1.25, 1.1, 1.05, 1.02] },
+            Effort::Quick => Self { budget: 40_000, ratios: &[3.0, 2.2, 1.6, 1.25, 1.1, 1.03] },
+            Effort::Standard => Self { budget: 400_000, ratios: &[3.0, 2.2, 1.6, 1.25, 1.1, 1.04] },
+            Effort::Thorough => Self { budget: 4_000_000, ratios: &[3.0, 2.2, 1.6, 1.25, 1.1, 1.05, 1.02] },
         }
     }
 }

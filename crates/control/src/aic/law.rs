@@ -1,6 +1,6 @@
 //! The controller's sampling step, its free energy and the gradient it descends.
 
-use certune_linsys::{Joints, Real};
+use certune_linsys::{Joints, Lanes, Real};
 
 use super::params::AicParams;
 use crate::controller::{Controller, Measurement};
@@ -77,7 +77,8 @@ impl<const N: usize, T: Real> Aic<N, T> {
     /// A diagnostic; the step does not use it. O(N).
     pub fn free_energy(&self, state: &AicState<N, T>, measurement: &Measurement<N, T>, goal: &Joints<N, T>) -> T {
         let error = self.prediction_errors(state, measurement, goal);
-        let weighted = |error: &Joints<N, T>, precision: &Joints<N, T>| square(error).component_mul(precision).sum();
+        let weighted =
+            |error: &Joints<N, T>, precision: &Joints<N, T>| error.component_mul(error).component_mul(precision).sum();
         let sum = weighted(&error.q, &self.precision_q)
             + weighted(&error.dq, &self.precision_dq)
             + weighted(&error.mu, &self.precision_mu)
@@ -86,6 +87,7 @@ impl<const N: usize, T: Real> Aic<N, T> {
     }
 
     /// The gradient of [`Aic::free_energy`] with respect to the beliefs in `state`. O(N).
+    #[inline(always)]
     pub fn free_energy_gradient(
         &self,
         state: &AicState<N, T>,
@@ -93,32 +95,53 @@ impl<const N: usize, T: Real> Aic<N, T> {
         goal: &Joints<N, T>,
     ) -> BeliefGradient<N, T> {
         let error = self.prediction_errors(state, measurement, goal);
-        let model_mu = error.mu.component_mul(&self.precision_mu);
-        let model_dmu = error.dmu.component_mul(&self.precision_dmu);
-        BeliefGradient {
-            mu: model_mu.component_mul(&self.rate_per_s) - error.q.component_mul(&self.precision_q),
-            dmu: model_mu + model_dmu.component_mul(&self.rate_per_s) - error.dq.component_mul(&self.precision_dq),
-            ddmu: model_dmu,
+        // Joint by joint, in place of vector expressions, so that lanes stay in registers.
+        let mut gradient = BeliefGradient { mu: *goal, dmu: *goal, ddmu: *goal };
+        for i in 0..N {
+            let model_mu = error.mu[i] * self.precision_mu[i];
+            let model_dmu = error.dmu[i] * self.precision_dmu[i];
+            gradient.mu[i] = model_mu * self.rate_per_s[i] - error.q[i] * self.precision_q[i];
+            gradient.dmu[i] = model_mu + model_dmu * self.rate_per_s[i] - error.dq[i] * self.precision_dq[i];
+            gradient.ddmu[i] = model_dmu;
         }
+        gradient
     }
 
+    #[inline(always)]
     fn prediction_errors(
         &self,
         state: &AicState<N, T>,
         measurement: &Measurement<N, T>,
         goal: &Joints<N, T>,
     ) -> PredictionErrors<N, T> {
-        PredictionErrors {
-            q: measurement.q - state.mu,
-            dq: measurement.dq - state.dmu,
-            mu: state.dmu + (state.mu - goal).component_mul(&self.rate_per_s),
-            dmu: state.ddmu + state.dmu.component_mul(&self.rate_per_s),
+        let mut error = PredictionErrors { q: *goal, dq: *goal, mu: *goal, dmu: *goal };
+        for i in 0..N {
+            error.q[i] = measurement.q[i] - state.mu[i];
+            error.dq[i] = measurement.dq[i] - state.dmu[i];
+            error.mu[i] = (state.mu[i] - goal[i]).mul_add(self.rate_per_s[i], state.dmu[i]);
+            error.dmu[i] = state.dmu[i].mul_add(self.rate_per_s[i], state.ddmu[i]);
         }
+        error
     }
 }
 
-fn square<const N: usize, T: Real>(x: &Joints<N, T>) -> Joints<N, T> {
-    x.component_mul(x)
+impl<const N: usize, T: Lanes> Aic<N, T> {
+    /// Controllers side by side: the parameters of each lane.
+    pub fn pack<'a>(of: impl Fn(usize) -> &'a AicParams<N>) -> Self {
+        let lanes = |get: &dyn Fn(&Aic<N>) -> f64| T::from_lanes(|lane| get(&Aic::new(of(lane))));
+        let joints =
+            |get: fn(&Aic<N>) -> &Joints<N>| Joints::from_fn(|joint, _| lanes(&|controller| get(controller)[joint]));
+        Self {
+            step_s: lanes(&|controller| controller.step_s),
+            kappa_mu: joints(|c| &c.kappa_mu),
+            kappa_a: joints(|c| &c.kappa_a),
+            precision_q: joints(|c| &c.precision_q),
+            precision_dq: joints(|c| &c.precision_dq),
+            precision_mu: joints(|c| &c.precision_mu),
+            precision_dmu: joints(|c| &c.precision_dmu),
+            rate_per_s: joints(|c| &c.rate_per_s),
+        }
+    }
 }
 
 impl<const N: usize, T: Real> Controller<N, T> for Aic<N, T> {
@@ -128,6 +151,7 @@ impl<const N: usize, T: Real> Controller<N, T> for Aic<N, T> {
         AicState { mu: at.q, dmu: at.dq, ddmu: Joints::zeros(), u: Joints::zeros() }
     }
 
+    #[inline(always)]
     fn step(
         &self,
         state: &AicState<N, T>,
@@ -135,13 +159,18 @@ impl<const N: usize, T: Real> Controller<N, T> for Aic<N, T> {
         goal: &Joints<N, T>,
     ) -> (AicState<N, T>, Joints<N, T>) {
         let gradient = self.free_energy_gradient(state, measurement, goal);
-        let mu = state.mu + (state.dmu - self.kappa_mu.component_mul(&gradient.mu)) * self.step_s;
-        let dmu = state.dmu + (state.ddmu - self.kappa_mu.component_mul(&gradient.dmu)) * self.step_s;
-        let ddmu = state.ddmu - self.kappa_mu.component_mul(&gradient.ddmu) * self.step_s;
-        // The authors' order: the torque descends with the beliefs just updated.
-        let surprise = (measurement.q - mu).component_mul(&self.precision_q)
-            + (measurement.dq - dmu).component_mul(&self.precision_dq);
-        let u = state.u - self.kappa_a.component_mul(&surprise) * self.step_s;
-        (AicState { mu, dmu, ddmu, u }, u)
+        let h = self.step_s;
+        let mut next = *state;
+        for i in 0..N {
+            let kappa = self.kappa_mu[i];
+            next.mu[i] = (state.dmu[i] - kappa * gradient.mu[i]).mul_add(h, state.mu[i]);
+            next.dmu[i] = (state.ddmu[i] - kappa * gradient.dmu[i]).mul_add(h, state.dmu[i]);
+            next.ddmu[i] = (-(kappa * gradient.ddmu[i])).mul_add(h, state.ddmu[i]);
+            // The authors' order: the torque descends with the beliefs just updated.
+            let surprise = (measurement.q[i] - next.mu[i]) * self.precision_q[i]
+                + (measurement.dq[i] - next.dmu[i]) * self.precision_dq[i];
+            next.u[i] = (-(self.kappa_a[i] * surprise)).mul_add(h, state.u[i]);
+        }
+        (next, next.u)
     }
 }
