@@ -56,7 +56,7 @@ impl Real for Pair {
         Self([x; 2])
     }
     fn sin_cos(self) -> (Self, Self) {
-        let [a, b] = self.0.map(f64::sin_cos);
+        let [a, b] = self.0.map(Real::sin_cos);
         (Self([a.0, b.0]), Self([a.1, b.1]))
     }
     fn sqrt(self) -> Self {

@@ -10,8 +10,12 @@
 //!
 //! ```text
 //! P_j = v_(j-1) x S_j,   Q_j = a_(j-1) x S_j + v_(j-1) x P_j
-//! dID_i/dq_j = S_i . (I_l^C Q_j + 2 B_l^C P_j [+ S_j x* f_j^C  if i < j])
+//! dID_i/dq_j  = S_i . (I_l^C Q_j + 2 B_l^C P_j [+ S_j x* f_j^C  if i < j])
+//! dID_i/ddq_j = S_i . (2 I_l^C P_j + 2 B_l^C S_j) = 2 C_ij
+//! M_ij        = S_i . I_l^C S_j
 //! ```
+//!
+//! Below the diagonal `S_i . I_i^C` and `S_i . 2 B_i^C` are formed once a row, so that an entry costs two scalar products.
 //!
 //! `2 B` of one body at velocity v = (w; u) with momentum (n; f) acts on the angular part alone:
 //! `2 B (a; b) = (-2 (w^ S + h^ u^) a; -2 f x a)`, S = tr(I)/2 1 - I its second moments, so a subtree's B is a 3x3 block and a vector.
@@ -19,22 +23,21 @@
 //! | symbol | code | shape | unit |
 //! |--------|------|-------|------|
 //! | v_i, a_i | `velocity`, `acceleration` (gravity as -a_g of the base) | 6 | rad/s, rad/s^2, .. |
+//! | P_j, Q_j | `first`, `second` | 6 | |
 //! | I^C, f^C | `composite`, `force` | ten numbers, 6 | kg, .. ; N m, N |
 //! | B^C | `Bias` | 3x3 and 3 | kg m^2/s, kg m/s |
 //!
 //! Source: Singh, Russell & Wensing, "Efficient analytical derivatives of rigid-body dynamics using spatial vector algebra" (2022);
-//! Carpentier & Mansard, "Analytical derivatives of rigid body dynamics algorithms" (2018). Limits: O(N^3); M must be positive definite.
+//! Carpentier & Mansard, "Analytical derivatives of rigid body dynamics algorithms" (2018). The derivatives of the torque cost O(N^2), the inverse of
+//! M and its two products O(N^3). Limits: M must be positive definite.
 
 use certune_linsys::{JointMatrix, Joints, Real};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::base::Base;
-use crate::coriolis::coriolis_matrix;
-use crate::forward::forward_dynamics;
-use crate::friction::friction_slope;
-use crate::mass::mass_matrix;
+use crate::friction::{friction_slope, friction_torque};
 use crate::model::{Model, State};
-use crate::spatial::{BodyInertia, Twist, Wrench, apply, cross, product};
+use crate::spatial::{BodyInertia, Twist, Wrench, apply, apply_transposed, cross, dot, product};
 
 /// Derivatives of the joint acceleration at one state and torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +52,15 @@ pub struct Linearisation<const N: usize, T: Real = f64> {
     pub ddq_dtau: JointMatrix<N, T>,
 }
 
+/// Derivatives of the torque that produces an acceleration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueDerivatives<const N: usize, T: Real = f64> {
+    /// `d tau / d q`, N m/rad.
+    pub dq: JointMatrix<N, T>,
+    /// `d tau / d dq`: twice the Coriolis matrix and the slope of the friction on the diagonal, N m s/rad.
+    pub ddq: JointMatrix<N, T>,
+}
+
 /// `2 B` of a body or a subtree, as in the module's text: a 3x3 block for the moment and `-2 f` for the force.
 #[derive(Clone, Copy)]
 struct Bias<T: Real> {
@@ -57,7 +69,8 @@ struct Bias<T: Real> {
 }
 
 impl<T: Real> Bias<T> {
-    fn of(body: &BodyInertia<T>, velocity: &Twist<T>) -> Self {
+    fn of(body: &BodyInertia<T>, velocity: &Twist<T>, force: &Vector3<T>) -> Self {
+        let minus_two = T::from_f64(-2.0);
         let half_trace = body.about_origin.trace() * T::from_f64(0.5);
         let mut second = body.about_origin.scaled(-T::one());
         second.xx += half_trace;
@@ -67,57 +80,156 @@ impl<T: Real> Bias<T> {
         let skew = |a: &Vector3<T>| Matrix3::new(o, -a.z, a.y, a.z, o, -a.x, -a.y, a.x, o);
         let block = product(&skew(&velocity.angular), &second.to_matrix())
             + product(&skew(&body.first_moment), &skew(&velocity.linear));
-        Self { block: block * T::from_f64(-2.0), momentum: body.apply(velocity).force * T::from_f64(-2.0) }
+        Self { block: block * minus_two, momentum: force * minus_two }
     }
 
     fn apply(&self, b: &Twist<T>) -> Wrench<T> {
         Wrench { moment: apply(&self.block, &b.angular), force: cross(&self.momentum, &b.angular) }
     }
+
+    /// What gives `a . (2 B b)` when multiplied with the angular part of b.
+    fn seen_by(&self, a: &Twist<T>) -> Vector3<T> {
+        apply_transposed(&self.block, &a.angular) + cross(&a.linear, &self.momentum)
+    }
 }
 
-/// `d ID / d q` at `(q, dq, ddq)`, N m/rad.
-fn inverse_dynamics_dq<const N: usize, T: Real>(
+/// One sweep at `(q, dq)`: what does not depend on the acceleration.
+struct Sweep<const N: usize, T: Real> {
+    axis: [Twist<T>; N],
+    /// Each link's own inertia, and that of all that hangs on it.
+    inertia: [BodyInertia<T>; N],
+    composite: [BodyInertia<T>; N],
+    bias: [Bias<T>; N],
+    /// Velocity of the parent, P, and acceleration and force for ddq = 0.
+    parent_velocity: [Twist<T>; N],
+    first: [Twist<T>; N],
+    acceleration: [Twist<T>; N],
+    force: [Wrench<T>; N],
+}
+
+impl<const N: usize, T: Real> Sweep<N, T> {
+    fn new(model: &Model<N, T>, at: &State<N, T>) -> Self {
+        let base = Base::at(model, &at.q);
+        let inertia = base.inertias(model);
+        let mut sweep = Self {
+            axis: base.axis,
+            inertia,
+            composite: inertia,
+            bias: [Bias { block: Matrix3::zeros(), momentum: Vector3::zeros() }; N],
+            parent_velocity: [Twist::zero(); N],
+            first: [Twist::zero(); N],
+            acceleration: [Twist::zero(); N],
+            force: [Wrench::zero(); N],
+        };
+        let (mut v, mut a) = (Twist::zero(), Twist { angular: Vector3::zeros(), linear: -model.gravity });
+        for i in 0..N {
+            let axis = &base.axis[i];
+            sweep.parent_velocity[i] = v;
+            sweep.first[i] = v.carry(axis);
+            a = a.plus(&sweep.first[i].scaled(at.dq[i]));
+            v = v.plus(&axis.scaled(at.dq[i]));
+            sweep.acceleration[i] = a;
+            let momentum = inertia[i].apply(&v);
+            sweep.bias[i] = Bias::of(&inertia[i], &v, &momentum.force);
+            sweep.force[i] = inertia[i].apply(&a).plus(&v.carry_wrench(&momentum));
+        }
+        for i in (1..N).rev() {
+            sweep.composite[i - 1] = sweep.composite[i - 1].plus(&sweep.composite[i]);
+            sweep.bias[i - 1].block += sweep.bias[i].block;
+            sweep.bias[i - 1].momentum += sweep.bias[i].momentum;
+        }
+        sweep
+    }
+
+    /// The rigid links' torque for ddq = 0, N m.
+    fn torque(&self) -> Joints<N, T> {
+        let mut sum = Wrench::zero();
+        let mut torque = Joints::zeros();
+        for i in (0..N).rev() {
+            sum = sum.plus(&self.force[i]);
+            torque[i] = self.axis[i].power(&sum);
+        }
+        torque
+    }
+
+    /// `I_i^C S_i`.
+    fn momenta(&self) -> [Wrench<T>; N] {
+        core::array::from_fn(|i| self.composite[i].apply(&self.axis[i]))
+    }
+
+    /// M, kg m^2.
+    fn mass_matrix(&self, model: &Model<N, T>, momenta: &[Wrench<T>; N]) -> JointMatrix<N, T> {
+        let mut mass = JointMatrix::zeros();
+        for j in 0..N {
+            for i in 0..=j {
+                let entry = self.axis[i].power(&momenta[j]);
+                mass[(i, j)] = entry;
+                mass[(j, i)] = entry;
+            }
+            mass[(j, j)] += model.rotor_inertia[j];
+        }
+        mass
+    }
+
+    /// The rigid links' derivatives at the acceleration `ddq`; friction is not in them.
+    fn derivatives(&self, dq: &Joints<N, T>, ddq: &Joints<N, T>, momenta: &[Wrench<T>; N]) -> TorqueDerivatives<N, T> {
+        let two = T::from_f64(2.0);
+        let axis = &self.axis;
+        let mut force = self.force;
+        let mut second = [Twist::zero(); N];
+        // What ddq adds to the accelerations for ddq = 0.
+        let mut added = Twist::zero();
+        let mut a = self.parent_acceleration();
+        for i in 0..N {
+            second[i] = a.plus(&added).carry(&axis[i]).plus(&self.parent_velocity[i].carry(&self.first[i]));
+            added = added.plus(&axis[i].scaled(ddq[i]));
+            a = a.plus(&self.first[i].scaled(dq[i]));
+            force[i] = force[i].plus(&self.inertia[i].apply(&added));
+        }
+        for i in (1..N).rev() {
+            force[i - 1] = force[i - 1].plus(&force[i]);
+        }
+        let seen: [Vector3<T>; N] = core::array::from_fn(|i| self.bias[i].seen_by(&axis[i]));
+        let mut by = TorqueDerivatives { dq: JointMatrix::zeros(), ddq: JointMatrix::zeros() };
+        for j in 0..N {
+            let (first, second) = (&self.first[j], &second[j]);
+            let own = self.composite[j].apply(second).plus(&self.bias[j].apply(first));
+            let above = own.plus(&axis[j].carry_wrench(&force[j]));
+            let moving = self.composite[j].apply(&first.scaled(two)).plus(&self.bias[j].apply(&axis[j]));
+            for i in 0..j {
+                by.dq[(i, j)] = axis[i].power(&above);
+                by.ddq[(i, j)] = axis[i].power(&moving);
+            }
+            by.dq[(j, j)] = axis[j].power(&own);
+            by.ddq[(j, j)] = axis[j].power(&moving);
+            for i in j + 1..N {
+                by.dq[(i, j)] = second.power(&momenta[i]) + dot(&first.angular, &seen[i]);
+                by.ddq[(i, j)] = first.power(&momenta[i]) * two + dot(&axis[j].angular, &seen[i]);
+            }
+        }
+        by
+    }
+
+    /// The base's.
+    fn parent_acceleration(&self) -> Twist<T> {
+        // The first joint's parent does not move: P_1 = 0.
+        self.acceleration[0]
+    }
+}
+
+/// How the torque that produces `ddq` changes with position and velocity, friction included. `ddq` in rad/s^2; O(N^2), no heap.
+pub fn inverse_dynamics_derivatives<const N: usize, T: Real>(
     model: &Model<N, T>,
     at: &State<N, T>,
     ddq: &Joints<N, T>,
-) -> JointMatrix<N, T> {
-    let base = Base::at(model, &at.q);
-    let mut composite = base.inertias(model);
-    let mut bias = [Bias { block: Matrix3::zeros(), momentum: Vector3::zeros() }; N];
-    let mut force = [Wrench::zero(); N];
-    let mut first = [Twist::zero(); N];
-    let mut second = [Twist::zero(); N];
-    let (mut v, mut a) = (Twist::zero(), Twist { angular: Vector3::zeros(), linear: -model.gravity });
+) -> TorqueDerivatives<N, T> {
+    let sweep = Sweep::new(model, at);
+    let mut by = sweep.derivatives(&at.dq, ddq, &sweep.momenta());
+    let slope = friction_slope(model, &at.dq);
     for i in 0..N {
-        let axis = &base.axis[i];
-        first[i] = v.carry(axis);
-        second[i] = a.carry(axis).plus(&v.carry(&first[i]));
-        a = a.plus(&axis.scaled(ddq[i])).plus(&first[i].scaled(at.dq[i]));
-        v = v.plus(&axis.scaled(at.dq[i]));
-        bias[i] = Bias::of(&composite[i], &v);
-        force[i] = composite[i].apply(&a).plus(&v.carry_wrench(&composite[i].apply(&v)));
+        by.ddq[(i, i)] += slope[i];
     }
-    for i in (1..N).rev() {
-        composite[i - 1] = composite[i - 1].plus(&composite[i]);
-        bias[i - 1].block += bias[i].block;
-        bias[i - 1].momentum += bias[i].momentum;
-        force[i - 1] = force[i - 1].plus(&force[i]);
-    }
-    let mut derivative = JointMatrix::<N, T>::zeros();
-    for j in 0..N {
-        let carried = base.axis[j].carry_wrench(&force[j]);
-        let own = composite[j].apply(&second[j]).plus(&bias[j].apply(&first[j]));
-        let above = own.plus(&carried);
-        for i in 0..j {
-            derivative[(i, j)] = base.axis[i].power(&above);
-        }
-        derivative[(j, j)] = base.axis[j].power(&own);
-        for i in j + 1..N {
-            let below = composite[i].apply(&second[j]).plus(&bias[i].apply(&first[j]));
-            derivative[(i, j)] = base.axis[i].power(&below);
-        }
-    }
-    derivative
+    by
 }
 
 /// The inverse of a symmetric positive definite matrix, by `L D L'`; symmetric to the bit.
@@ -164,19 +276,20 @@ fn inverse_of_positive<const N: usize, T: Real>(matrix: &JointMatrix<N, T>) -> J
     inverse
 }
 
-/// How the acceleration changes with position, velocity and torque at `at` under `tau` (N m). O(N^3), no heap.
+/// How the acceleration changes with position, velocity and torque at `at` under `tau` (N m). No heap.
 pub fn linearise<const N: usize, T: Real>(
     model: &Model<N, T>,
     at: &State<N, T>,
     tau: &Joints<N, T>,
 ) -> Linearisation<N, T> {
-    let ddq = forward_dynamics(model, at, tau);
-    let inverse = inverse_of_positive(&mass_matrix(model, &at.q));
-    let by_position = inverse_dynamics_dq(model, at, &ddq);
-    let mut by_velocity = coriolis_matrix(model, at) * T::from_f64(2.0);
+    let sweep = Sweep::new(model, at);
+    let momenta = sweep.momenta();
+    let inverse = inverse_of_positive(&sweep.mass_matrix(model, &momenta));
+    let ddq = inverse * (tau - sweep.torque() - friction_torque(model, &at.dq));
+    let mut by = sweep.derivatives(&at.dq, &ddq, &momenta);
     let slope = friction_slope(model, &at.dq);
     for i in 0..N {
-        by_velocity[(i, i)] += slope[i];
+        by.ddq[(i, i)] += slope[i];
     }
-    Linearisation { ddq, ddq_dq: -(inverse * by_position), ddq_ddq: -(inverse * by_velocity), ddq_dtau: inverse }
+    Linearisation { ddq, ddq_dq: -(inverse * by.dq), ddq_ddq: -(inverse * by.ddq), ddq_dtau: inverse }
 }

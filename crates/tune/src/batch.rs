@@ -98,8 +98,10 @@ impl<const N: usize> Batch<N> {
         self.plants
             .par_chunks(InstructionSet::widest().lanes())
             .flat_map_iter(|plants| {
-                let run = |(index, plant)| (Run { plant, task: &self.task, noise: self.noise(*index) }, params);
-                let runs: Vec<_> = plants.iter().map(|(index, plant)| run((index, plant))).collect();
+                let runs: Vec<_> = plants
+                    .iter()
+                    .map(|(index, plant)| (Run { plant, task: &self.task, noise: self.noise(*index) }, params))
+                    .collect();
                 simulate_many(&runs).into_iter().zip(plants).map(|(metrics, (index, _))| PlantResult {
                     plant: *index,
                     outcome: score::of_run(&metrics, &self.start_rad, self.task.step_s),
