@@ -37,8 +37,7 @@
 use certune_control::aic::{Aic, AicParams};
 use certune_control::{Controller, Measurement};
 use certune_dynamics::{
-    COULOMB_SPEED_RAD_PER_S, Model, Robot, State, flange_jacobian, forward_dynamics, forward_dynamics_with_armature,
-    gravity_torque,
+    COULOMB_SPEED_RAD_PER_S, Model, Robot, State, flange_jacobian, forward_dynamics_with_armature, gravity_torque,
 };
 use certune_linsys::{Joints, Lanes, Real};
 use certune_simd::{InstructionSet, Kernel};
@@ -456,7 +455,11 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
         self.commands[self.step as usize % RING] = u;
         let mut asked = self.delayed();
         if self.features.compensation {
-            let gravity = gravity_torque(&self.nominal, &self.state.q);
+            let gravity = if T::LANES == 1 {
+                gravity_single(&self.nominal, &self.state.q)
+            } else {
+                gravity_torque(&self.nominal, &self.state.q)
+            };
             for joint in 0..N {
                 let with = asked[joint] + gravity[joint];
                 asked[joint] = self.compensated.choose(T::zero(), asked[joint], with);
@@ -471,7 +474,11 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
         recorder.sample(&Sample { step, t_s, at, measurement, goal, u, tau: given, state });
 
         let torque = if self.features.pushes { self.pushed(&given) } else { given };
-        let next = integrate(&self.model, self.coulomb, self.state, &torque, &self.integrator, self.step_s);
+        let next = if T::LANES == 1 {
+            integrate_single(&self.model, self.coulomb, self.state, &torque, &self.integrator, self.step_s)
+        } else {
+            integrate(&self.model, self.coulomb, self.state, &torque, &self.integrator, self.step_s)
+        };
         self.step += 1;
         // 0 where every joint is in its place.
         let (zero, one) = (T::zero(), T::one());
@@ -631,8 +638,10 @@ fn gaussian(rng: &mut ChaCha8Rng) -> f64 {
 }
 
 /// The state one sample later, `torque` held.
+///
+/// One place calls the arm's dynamics, so that each instruction set holds them once.
 #[inline(always)]
-pub(crate) fn integrate<const N: usize, T: Lanes>(
+fn integrate<const N: usize, T: Lanes>(
     model: &Model<N, T>,
     coulomb: bool,
     mut state: State<N, T>,
@@ -641,48 +650,65 @@ pub(crate) fn integrate<const N: usize, T: Lanes>(
     step_s: f64,
 ) -> State<N, T> {
     let h = T::from_f64(step_s / f64::from(integrator.substeps));
+    let stages = match integrator.method {
+        Method::SemiImplicitEuler => 1,
+        Method::RungeKutta4 => RUNGE_KUTTA.len(),
+    };
     for _ in 0..integrator.substeps {
-        match integrator.method {
-            Method::SemiImplicitEuler => {
-                let ddq = if coulomb {
-                    let mut slope = *model.coulomb_n_m();
-                    for joint in 0..N {
-                        let speed = state.dq[joint];
-                        slope[joint] = slope[joint] * T::from_lanes(|lane| secant(speed.lane(lane))) * h;
-                    }
-                    forward_dynamics_with_armature(model, &state, torque, &slope)
-                } else {
-                    forward_dynamics(model, &state, torque)
-                };
+        let start = state;
+        let (mut at, mut sum) = (state, State::<N, T>::at_rest(Joints::zeros()));
+        for stage in 0..stages {
+            let mut slope = Joints::<N, T>::zeros();
+            if coulomb && stages == 1 {
                 for joint in 0..N {
-                    state.dq[joint] = ddq[joint].mul_add(h, state.dq[joint]);
-                    state.q[joint] = state.dq[joint].mul_add(h, state.q[joint]);
+                    let speed = at.dq[joint];
+                    slope[joint] = model.coulomb_n_m()[joint] * T::from_lanes(|lane| secant(speed.lane(lane))) * h;
                 }
             }
-            Method::RungeKutta4 => state = runge_kutta(model, &state, torque, h),
+            let ddq = forward_dynamics_with_armature(model, &at, torque, &slope);
+            if stages == 1 {
+                for joint in 0..N {
+                    state.dq[joint] = ddq[joint].mul_add(h, start.dq[joint]);
+                    state.q[joint] = state.dq[joint].mul_add(h, start.q[joint]);
+                }
+                continue;
+            }
+            let (weight, ahead) = RUNGE_KUTTA[stage];
+            let (weight, ahead) = (T::from_f64(weight), h * T::from_f64(ahead));
+            for joint in 0..N {
+                sum.q[joint] = at.dq[joint].mul_add(weight, sum.q[joint]);
+                sum.dq[joint] = ddq[joint].mul_add(weight, sum.dq[joint]);
+                let speed = at.dq[joint];
+                at.q[joint] = speed.mul_add(ahead, start.q[joint]);
+                at.dq[joint] = ddq[joint].mul_add(ahead, start.dq[joint]);
+                state.q[joint] = sum.q[joint].mul_add(h, start.q[joint]);
+                state.dq[joint] = sum.dq[joint].mul_add(h, start.dq[joint]);
+            }
         }
     }
     state
 }
 
-/// One step of the classical method of order 4.
-fn runge_kutta<const N: usize, T: Lanes>(
+/// Weight of each stage of the classical method of order 4, and how far ahead of the start the next stage looks, in steps.
+const RUNGE_KUTTA: [(f64, f64); 4] = [(1.0 / 6.0, 0.5), (1.0 / 3.0, 0.5), (1.0 / 3.0, 1.0), (1.0 / 6.0, 0.0)];
+
+/// [`integrate`] for one arm, compiled once for all controllers; lanes must stay in the registers of the caller.
+#[inline(never)]
+fn integrate_single<const N: usize, T: Lanes>(
     model: &Model<N, T>,
-    state: &State<N, T>,
+    coulomb: bool,
+    state: State<N, T>,
     torque: &Joints<N, T>,
-    h: T,
+    integrator: &Integrator,
+    step_s: f64,
 ) -> State<N, T> {
-    let (half, two, sixth) = (h * T::from_f64(0.5), T::from_f64(2.0), h / T::from_f64(6.0));
-    let rate = |at: &State<N, T>| State { q: at.dq, dq: forward_dynamics(model, at, torque) };
-    let along = |rate: &State<N, T>, t: T| State { q: state.q + rate.q * t, dq: state.dq + rate.dq * t };
-    let k1 = rate(state);
-    let k2 = rate(&along(&k1, half));
-    let k3 = rate(&along(&k2, half));
-    let k4 = rate(&along(&k3, h));
-    State {
-        q: state.q + (k1.q + (k2.q + k3.q) * two + k4.q) * sixth,
-        dq: state.dq + (k1.dq + (k2.dq + k3.dq) * two + k4.dq) * sixth,
-    }
+    integrate(model, coulomb, state, torque, integrator, step_s)
+}
+
+/// [`gravity_torque`] for one arm, as [`integrate_single`].
+#[inline(never)]
+fn gravity_single<const N: usize, T: Lanes>(model: &Model<N, T>, q: &Joints<N, T>) -> Joints<N, T> {
+    gravity_torque(model, q)
 }
 
 /// `tanh(dq/ε)/dq`, s/rad: `1/ε` at rest.
