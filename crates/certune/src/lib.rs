@@ -55,6 +55,10 @@ pub use certune_verify as verify;
 #[doc = include_str!("_docs/architecture.md")]
 pub mod guide {}
 
+/// Where the time of a simulation goes, and what the limit is.
+#[doc = include_str!("_docs/speed.md")]
+pub mod speed {}
+
 mod adaptive;
 mod lyapunov;
 mod stability;

@@ -4,10 +4,12 @@
 //! |---|---|
 //! | `cargo xtask ci` | every check, in the order in which a failure is cheapest to learn |
 //! | `cargo xtask golden` | writes the golden data again from Pinocchio (needs `pip install pin example-robot-data`) |
+//! | `cargo xtask peers` | sets up Pinocchio and MuJoCo from PyPI, and measures them and ours in turn: one table |
 //! | `cargo xtask claims` | writes the certificates in `proofs/certificates/` again, and the list of them in `proofs/README.md` |
 #![forbid(unsafe_code)]
 
 mod house;
+mod peers;
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -22,7 +24,8 @@ fn main() -> ExitCode {
         ["ci"] => ci(),
         ["golden"] => golden(),
         ["claims"] => claims(),
-        _ => Err("usage: cargo xtask ci | golden | claims".to_owned()),
+        ["peers"] => peers::peers(),
+        _ => Err("usage: cargo xtask ci | golden | claims | peers".to_owned()),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
