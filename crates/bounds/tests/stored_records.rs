@@ -154,7 +154,7 @@ fn attack(stored: &Stored, limits: &Limits, index: u64) {
     // Every eighth member is climbed on, once in each metric.
     let metric = [None, Some(&m)][(index / 8 % 2) as usize];
     let mut y = unit(&mut rng);
-    for _ in 0..if index % 8 == 0 { 6 } else { 1 } {
+    for _ in 0..if index.is_multiple_of(8) { 6 } else { 1 } {
         let form = slopes.iter().zip(y.iter()).fold(Matrix::zeros(), |sum, (slope, yj)| sum + slope * (0.5 * yj));
         for signed in [form, -form] {
             holds("k_c", not_negative(&(identity * limits.k_c + signed), limits.k_c));

@@ -1,4 +1,4 @@
-//! Sine and cosine together, from the operations of [`Real`](crate::Real) alone: one source for a number and for lanes of numbers.
+//! Sine and cosine together, from the operations of [`Real`] alone: one source for a number and for lanes of numbers.
 //!
 //! ```text
 //! k = round(2x/π),  r = x - k π/2 (π/2 in three parts of 33, 33 and 53 bits),  |r| <= π/4
