@@ -15,7 +15,7 @@ use std::hint::black_box;
 use std::path::Path;
 
 use certune_closed_loop::{Gains, GainsFile, NoiseStream, Plant, PlantSetting, Run, Scenario, Task, simulate_many_on};
-use certune_control::aic::{Aic, AicGains, AicParams};
+use certune_control::aic::{Aic, AicParams};
 use certune_control::mrac::{Mrac, MracParams};
 use certune_control::{Controller, Measurement};
 use certune_dynamics::{
@@ -99,16 +99,7 @@ fn samples(robot: &Robot) -> Vec<Sample> {
 }
 
 fn published<const N: usize>() -> AicParams<N> {
-    let gains = AicGains {
-        kappa_mu: [11.67],
-        kappa_a: [700.0],
-        sigma_q: [1.0],
-        sigma_dq: [1.0],
-        sigma_mu: [5.0],
-        sigma_dmu: [10.0],
-        reference_time_constant_s: [1.0],
-    };
-    AicParams::new(&gains.on_every_joint(), 1e-3).unwrap()
+    AicParams::new(&certune_testkit::PUBLISHED.on_every_joint(), 1e-3).unwrap()
 }
 
 /// The task of the peers' programs: 24 s of pick and place from rest in B, on the bare model with the motors' limits.

@@ -10,17 +10,8 @@ use certune_closed_loop::{
 use certune_control::aic::{Aic, AicGains, AicParams};
 use certune_dynamics::Robot;
 use certune_simd::InstructionSet;
+use certune_testkit::PUBLISHED;
 use proptest::prelude::*;
-
-const PUBLISHED: AicGains<1> = AicGains {
-    kappa_mu: [11.67],
-    kappa_a: [700.0],
-    sigma_q: [1.0],
-    sigma_dq: [1.0],
-    sigma_mu: [5.0],
-    sigma_dmu: [10.0],
-    reference_time_constant_s: [1.0],
-};
 
 fn scenario() -> Scenario {
     let file = Path::new("pick-and-place.toml");

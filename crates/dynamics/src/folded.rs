@@ -15,7 +15,7 @@
 use certune_linsys::Real;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::local::Turn;
+use crate::local::{Passage, Turn};
 use crate::model::CompiledLink;
 use crate::spatial::BodyInertia;
 
@@ -33,10 +33,11 @@ pub(crate) struct Hinge<T: Real> {
 }
 
 impl<T: Real> Hinge<T> {
-    /// The tilt as a turn.
+    /// The way to the parent at the joint's angle, rad.
     #[inline(always)]
-    pub(crate) fn tilt(&self) -> Turn<T> {
-        Turn { sin: self.tilt[0], cos: self.tilt[1] }
+    pub(crate) fn passage(&self, q: T) -> Passage<T> {
+        let (sin, cos) = (q + self.offset).sin_cos();
+        Passage { tilt: Turn { sin: self.tilt[0], cos: self.tilt[1] }, turn: Turn { sin, cos } }
     }
 }
 

@@ -23,7 +23,7 @@
 use certune_linsys::{Joints, Real};
 
 use crate::friction::friction_torque;
-use crate::local::{Body, M3, Passage, Turn, V3, apply, less_outer, sum};
+use crate::local::{Body, M3, Passage, V3, apply, less_outer, sum};
 use crate::model::{Model, State};
 use crate::spatial::Sym3;
 
@@ -182,11 +182,10 @@ fn articulated_body<const N: usize, T: Real>(
     let o = T::zero();
     let zero = V3::zero();
     let none = Wrench { moment: zero, force: zero };
-    let still = Turn { sin: o, cos: o };
     let friction = friction_torque(model, &at.dq);
     let mut wrench = [none; N];
     let mut joint = [JointShare {
-        passage: Passage { tilt: still, turn: still },
+        passage: Passage::zero(),
         bias: [o; 2],
         bias_linear: zero,
         u_moment: zero,
@@ -198,8 +197,7 @@ fn articulated_body<const N: usize, T: Real>(
     let mut w = zero;
     for i in 0..N {
         let (hinge, dq) = (&model.chain[i], at.dq[i]);
-        let (sin, cos) = (at.q[i] + hinge.offset).sin_cos();
-        let passage = Passage { tilt: hinge.tilt(), turn: Turn { sin, cos } };
+        let passage = hinge.passage(at.q[i]);
         let p = V3::of(&hinge.position);
         joint[i].passage = passage;
         joint[i].bias_linear = passage.to_child(&w.cross(&w.cross(&p)));

@@ -20,7 +20,7 @@ use certune_linsys::{JointMatrix, Joints, Real};
 use nalgebra::Vector3;
 
 use crate::base::Base;
-use crate::local::{Passage, Turn, V3};
+use crate::local::{Passage, V3};
 use crate::model::Model;
 use crate::spatial::{apply, cross, dot};
 
@@ -47,20 +47,16 @@ fn moments<const N: usize, T: Real>(model: &Model<N, T>, base: &Base<N, T>) -> [
 /// In link frames, where the joint's axis is z: `g_i = -(h x a_g)_z` with the subtree's first moment h about the joint's origin.
 #[inline(always)]
 pub fn gravity_torque<const N: usize, T: Real>(model: &Model<N, T>, q: &Joints<N, T>) -> Joints<N, T> {
-    let o = T::zero();
-    let still = Turn { sin: o, cos: o };
-    let mut passage = [Passage { tilt: still, turn: still }; N];
+    let mut passage = [Passage::zero(); N];
     let mut fall = [V3::zero(); N];
     let mut falling = V3::of(&model.folded_gravity);
     for i in 0..N {
-        let hinge = &model.chain[i];
-        let (sin, cos) = (q[i] + hinge.offset).sin_cos();
-        passage[i] = Passage { tilt: hinge.tilt(), turn: Turn { sin, cos } };
+        passage[i] = model.chain[i].passage(q[i]);
         falling = passage[i].to_child(&falling);
         fall[i] = falling;
     }
     let mut torque = *q;
-    let (mut mass, mut moment) = (o, V3::zero());
+    let (mut mass, mut moment) = (T::zero(), V3::zero());
     for i in (0..N).rev() {
         let hinge = &model.chain[i];
         moment = moment + V3::of(&hinge.body.first_moment);

@@ -24,7 +24,7 @@ use certune_linsys::{Joints, Real};
 use nalgebra::Vector3;
 
 use crate::friction::friction_torque;
-use crate::local::{Body, Passage, Turn, V3, apply};
+use crate::local::{Body, Passage, V3, apply};
 use crate::model::{Model, State};
 
 /// Joint torques that produce `ddq`: `tau = M(q) ddq + C(q, dq) dq + g(q) + friction(dq)`, rotor inertia included.
@@ -53,15 +53,13 @@ pub(crate) fn newton_euler<const N: usize, T: Real>(
     ddq: &Joints<N, T>,
     upward: &Vector3<T>,
 ) -> Joints<N, T> {
-    let (o, zero) = (T::zero(), V3::zero());
-    let still = Turn { sin: o, cos: o };
-    let mut passage = [Passage { tilt: still, turn: still }; N];
+    let zero = V3::zero();
+    let mut passage = [Passage::zero(); N];
     let mut wrench = [[zero; 2]; N];
     let (mut w, mut dw, mut a) = (zero, zero, V3::of(upward));
     for i in 0..N {
         let hinge = &model.chain[i];
-        let (sin, cos) = (q[i] + hinge.offset).sin_cos();
-        let (here, p) = (Passage { tilt: hinge.tilt(), turn: Turn { sin, cos } }, V3::of(&hinge.position));
+        let (here, p) = (hinge.passage(q[i]), V3::of(&hinge.position));
         a = here.to_child(&(a + dw.cross(&p) + w.cross(&w.cross(&p))));
         w = here.to_child(&w);
         dw = here.to_child(&dw);

@@ -36,6 +36,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::base::Base;
 use crate::friction::{friction_slope, friction_torque};
+use crate::mass::from_momenta;
 use crate::model::{Model, State};
 use crate::spatial::{BodyInertia, Twist, Wrench, apply, apply_transposed, cross, dot, product};
 
@@ -100,10 +101,10 @@ struct Sweep<const N: usize, T: Real> {
     inertia: [BodyInertia<T>; N],
     composite: [BodyInertia<T>; N],
     bias: [Bias<T>; N],
-    /// Velocity of the parent, P, and acceleration and force for ddq = 0.
+    /// Velocity of the parent, P, and for ddq = 0 the parent's acceleration and the link's force.
     parent_velocity: [Twist<T>; N],
     first: [Twist<T>; N],
-    acceleration: [Twist<T>; N],
+    parent_acceleration: [Twist<T>; N],
     force: [Wrench<T>; N],
 }
 
@@ -118,17 +119,17 @@ impl<const N: usize, T: Real> Sweep<N, T> {
             bias: [Bias { block: Matrix3::zeros(), momentum: Vector3::zeros() }; N],
             parent_velocity: [Twist::zero(); N],
             first: [Twist::zero(); N],
-            acceleration: [Twist::zero(); N],
+            parent_acceleration: [Twist::zero(); N],
             force: [Wrench::zero(); N],
         };
         let (mut v, mut a) = (Twist::zero(), Twist { angular: Vector3::zeros(), linear: -model.gravity });
         for i in 0..N {
             let axis = &base.axis[i];
             sweep.parent_velocity[i] = v;
+            sweep.parent_acceleration[i] = a;
             sweep.first[i] = v.carry(axis);
             a = a.plus(&sweep.first[i].scaled(at.dq[i]));
             v = v.plus(&axis.scaled(at.dq[i]));
-            sweep.acceleration[i] = a;
             let momentum = inertia[i].apply(&v);
             sweep.bias[i] = Bias::of(&inertia[i], &v, &momentum.force);
             sweep.force[i] = inertia[i].apply(&a).plus(&v.carry_wrench(&momentum));
@@ -157,33 +158,26 @@ impl<const N: usize, T: Real> Sweep<N, T> {
         core::array::from_fn(|i| self.composite[i].apply(&self.axis[i]))
     }
 
-    /// M, kg m^2.
-    fn mass_matrix(&self, model: &Model<N, T>, momenta: &[Wrench<T>; N]) -> JointMatrix<N, T> {
-        let mut mass = JointMatrix::zeros();
-        for j in 0..N {
-            for i in 0..=j {
-                let entry = self.axis[i].power(&momenta[j]);
-                mass[(i, j)] = entry;
-                mass[(j, i)] = entry;
-            }
-            mass[(j, j)] += model.rotor_inertia[j];
-        }
-        mass
-    }
-
-    /// The rigid links' derivatives at the acceleration `ddq`; friction is not in them.
-    fn derivatives(&self, dq: &Joints<N, T>, ddq: &Joints<N, T>, momenta: &[Wrench<T>; N]) -> TorqueDerivatives<N, T> {
+    /// The torque's derivatives at the acceleration `ddq`, friction included.
+    fn derivatives(
+        &self,
+        model: &Model<N, T>,
+        dq: &Joints<N, T>,
+        ddq: &Joints<N, T>,
+        momenta: &[Wrench<T>; N],
+    ) -> TorqueDerivatives<N, T> {
         let two = T::from_f64(2.0);
         let axis = &self.axis;
         let mut force = self.force;
         let mut second = [Twist::zero(); N];
         // What ddq adds to the accelerations for ddq = 0.
         let mut added = Twist::zero();
-        let mut a = self.parent_acceleration();
         for i in 0..N {
-            second[i] = a.plus(&added).carry(&axis[i]).plus(&self.parent_velocity[i].carry(&self.first[i]));
+            second[i] = self.parent_acceleration[i]
+                .plus(&added)
+                .carry(&axis[i])
+                .plus(&self.parent_velocity[i].carry(&self.first[i]));
             added = added.plus(&axis[i].scaled(ddq[i]));
-            a = a.plus(&self.first[i].scaled(dq[i]));
             force[i] = force[i].plus(&self.inertia[i].apply(&added));
         }
         for i in (1..N).rev() {
@@ -207,13 +201,11 @@ impl<const N: usize, T: Real> Sweep<N, T> {
                 by.ddq[(i, j)] = first.power(&momenta[i]) * two + dot(&axis[j].angular, &seen[i]);
             }
         }
+        let slope = friction_slope(model, dq);
+        for i in 0..N {
+            by.ddq[(i, i)] += slope[i];
+        }
         by
-    }
-
-    /// The base's.
-    fn parent_acceleration(&self) -> Twist<T> {
-        // The first joint's parent does not move: P_1 = 0.
-        self.acceleration[0]
     }
 }
 
@@ -224,12 +216,7 @@ pub fn inverse_dynamics_derivatives<const N: usize, T: Real>(
     ddq: &Joints<N, T>,
 ) -> TorqueDerivatives<N, T> {
     let sweep = Sweep::new(model, at);
-    let mut by = sweep.derivatives(&at.dq, ddq, &sweep.momenta());
-    let slope = friction_slope(model, &at.dq);
-    for i in 0..N {
-        by.ddq[(i, i)] += slope[i];
-    }
-    by
+    sweep.derivatives(model, &at.dq, ddq, &sweep.momenta())
 }
 
 /// The inverse of a symmetric positive definite matrix, by `L D L'`; symmetric to the bit.
@@ -284,12 +271,8 @@ pub fn linearise<const N: usize, T: Real>(
 ) -> Linearisation<N, T> {
     let sweep = Sweep::new(model, at);
     let momenta = sweep.momenta();
-    let inverse = inverse_of_positive(&sweep.mass_matrix(model, &momenta));
+    let inverse = inverse_of_positive(&from_momenta(model, &sweep.axis, &momenta));
     let ddq = inverse * (tau - sweep.torque() - friction_torque(model, &at.dq));
-    let mut by = sweep.derivatives(&at.dq, &ddq, &momenta);
-    let slope = friction_slope(model, &at.dq);
-    for i in 0..N {
-        by.ddq[(i, i)] += slope[i];
-    }
+    let by = sweep.derivatives(model, &at.dq, &ddq, &momenta);
     Linearisation { ddq, ddq_dq: -(inverse * by.dq), ddq_ddq: -(inverse * by.ddq), ddq_dtau: inverse }
 }

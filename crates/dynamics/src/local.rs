@@ -199,6 +199,13 @@ pub(crate) struct Passage<T> {
 }
 
 impl<T: Real> Passage<T> {
+    /// A place for a passage that is not yet known.
+    #[inline(always)]
+    pub(crate) fn zero() -> Self {
+        let still = Turn { sin: T::zero(), cos: T::zero() };
+        Self { tilt: still, turn: still }
+    }
+
     /// `R v`.
     #[inline(always)]
     pub(crate) fn to_parent(self, v: &V3<T>) -> V3<T> {

@@ -14,6 +14,7 @@ use certune_linsys::{JointMatrix, Joints, Real};
 
 use crate::base::Base;
 use crate::model::Model;
+use crate::spatial::{Twist, Wrench};
 
 /// Joint-space inertia `M(q)`, rotor inertia included, kg m^2, base to tip.
 ///
@@ -21,11 +22,20 @@ use crate::model::Model;
 pub fn mass_matrix<const N: usize, T: Real>(model: &Model<N, T>, q: &Joints<N, T>) -> JointMatrix<N, T> {
     let base = Base::at(model, q);
     let composite = base.composites(model);
+    from_momenta(model, &base.axis, &core::array::from_fn(|j| composite[j].apply(&base.axis[j])))
+}
+
+/// M from the joint axes S_j and the momenta `I_j^C S_j`.
+#[inline]
+pub(crate) fn from_momenta<const N: usize, T: Real>(
+    model: &Model<N, T>,
+    axis: &[Twist<T>; N],
+    momenta: &[Wrench<T>; N],
+) -> JointMatrix<N, T> {
     let mut mass = JointMatrix::<N, T>::zeros();
     for j in 0..N {
-        let momentum = composite[j].apply(&base.axis[j]);
         for i in 0..=j {
-            let entry = base.axis[i].power(&momentum);
+            let entry = axis[i].power(&momenta[j]);
             mass[(i, j)] = entry;
             mass[(j, i)] = entry;
         }
