@@ -16,7 +16,7 @@ use crate::commands::{certify, constants, inspect, lists, report, simulate, tune
 use crate::error::Error;
 use crate::output;
 use crate::values::{
-    ARMS_OWN, Interval, Numbers, claim, delay, interval, non_negative, numbers, objective, share, threads,
+    ARMS_OWN, Interval, Numbers, claim, delay, interval, non_negative, numbers, objective, plants, share, threads,
     torque_limits,
 };
 
@@ -119,6 +119,9 @@ pub struct TuneArgs {
     /// Candidates to evaluate [default: 100]
     #[arg(long, value_name = "N")]
     pub budget: Option<usize>,
+    /// Plants of the scenario's box on which each candidate is simulated [default: 8]
+    #[arg(long, value_name = "N", value_parser = plants)]
+    pub plants: Option<usize>,
     /// Seed of every random draw [default: 1]
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,

@@ -6,6 +6,7 @@
 //! | `commands` | one file a command |
 //! | `values` | values of options: what they may be, and what is said when they are not |
 //! | `catalogue` | robots, presets, scenarios, search spaces and proved constants, by name or by path |
+//! | `sizes` | an arm's number of joints as a type |
 //! | `run` | a run's folder: `gains.toml`, `run.json`, `certificate.json`, `report.html` |
 //! | `page` | a run's record into the data of its page |
 //! | `output` | tables, wrapped text, JSON, files written whole or not at all |
@@ -24,6 +25,7 @@ mod output;
 mod page;
 mod progress;
 mod run;
+mod sizes;
 mod values;
 mod versions;
 

@@ -102,6 +102,7 @@ fn in_words(outcome: Outcome, objective: ObjectiveName) -> String {
     match outcome {
         Outcome::Certified { cost } => format!("certified, {}", achieved(cost.get(), objective)),
         Outcome::Simulated { cost } => achieved(cost.get(), objective),
+        Outcome::Stopped { cost_above } => format!("given up above {}", achieved(cost_above.get(), objective)),
         Outcome::Uncertified { cost } if objective == ObjectiveName::SettlingCost => {
             format!("not certified, {}", achieved(cost.get(), objective))
         }

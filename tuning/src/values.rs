@@ -57,6 +57,16 @@ pub fn threads(text: &str) -> Result<usize, String> {
     }
 }
 
+/// Plants of a search: fewer than anybody would wait for.
+pub fn plants(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("at least 1 plant is needed".to_owned()),
+        Ok(count) if count > 10_000 => Err("at most 10000 plants are supported".to_owned()),
+        Ok(count) => Ok(count),
+        Err(_) => Err("expected a number of plants, 1 or more".to_owned()),
+    }
+}
+
 /// An objective by its name.
 pub fn objective(text: &str) -> Result<ObjectiveName, String> {
     let names = || ObjectiveName::ALL.iter().map(|objective| objective.name());

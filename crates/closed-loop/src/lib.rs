@@ -64,6 +64,7 @@ pub use plant_box::{PlantBox, PlantError, PlantSetting};
 pub use scenario::Scenario;
 pub use simulate::{
     Bundle, NoiseStream, Plant, Progress, Recorder, Run, Sample, Simulation, simulate, simulate_many, simulate_many_on,
+    simulate_many_while,
 };
 pub use task::Task;
 pub use trajectory::{AicDiagnostics, Row, Trajectory, aic_diagnostics};

@@ -549,6 +549,11 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
         self.next_goal = ends.min().unwrap_or(u64::MAX);
     }
 
+    /// The figures of the first `runs` lanes so far.
+    fn figures(&self, runs: usize) -> Vec<Metrics> {
+        (0..runs).map(|lane| self.metrics_of(lane)).collect()
+    }
+
     /// The figures of a lane so far.
     pub fn metrics_of(&self, lane: usize) -> Metrics {
         let current = self.meter.lane(lane);
@@ -575,23 +580,67 @@ pub fn simulate_many<const N: usize>(runs: &[(Run<'_, N>, &AicParams<N>)]) -> Ve
 
 /// [`simulate_many`] on an instruction set of one's choice.
 pub fn simulate_many_on<const N: usize>(set: InstructionSet, runs: &[(Run<'_, N>, &AicParams<N>)]) -> Vec<Metrics> {
-    let alike = runs.chunk_by(|(a, _), (b, _)| a.task.steps_alike(b.task));
-    alike.flat_map(|runs| runs.chunks(set.lanes())).flat_map(|runs| set.run(WholeTasks(runs))).collect()
+    bundles(set, runs).flat_map(|runs| set.run(WholeTasks { runs, watch: None })).collect()
+}
+
+/// [`simulate_many`], looked at on the way: `go_on` is given the first of the runs of a bundle by its place in `runs`, and the figures so far of them all, every
+/// `every` samples, and ends the bundle by `false`. The figures of an ended run are those up to there.
+pub fn simulate_many_while<const N: usize>(
+    runs: &[(Run<'_, N>, &AicParams<N>)],
+    every: u64,
+    go_on: &mut dyn FnMut(usize, &[Metrics]) -> bool,
+) -> Vec<Metrics> {
+    let set = InstructionSet::widest();
+    let mut figures = Vec::with_capacity(runs.len());
+    for runs in bundles(set, runs) {
+        let first = figures.len();
+        let mut look = |found: &[Metrics]| go_on(first, found);
+        figures.extend(set.run(WholeTasks { runs, watch: Some(Watch { every, go_on: &mut look }) }));
+    }
+    figures
+}
+
+/// Neighbours that can share a bundle.
+fn bundles<'a, 'b, const N: usize>(
+    set: InstructionSet,
+    runs: &'a [(Run<'b, N>, &'b AicParams<N>)],
+) -> impl Iterator<Item = &'a [(Run<'b, N>, &'b AicParams<N>)]> {
+    runs.chunk_by(|(a, _), (b, _)| a.task.steps_alike(b.task)).flat_map(move |runs| runs.chunks(set.lanes()))
+}
+
+/// Who looks at a bundle, and after how many samples each time.
+struct Watch<'a> {
+    every: u64,
+    go_on: &'a mut dyn FnMut(&[Metrics]) -> bool,
 }
 
 /// A bundle from its start to its end.
-struct WholeTasks<'a, 'b, const N: usize>(&'a [(Run<'b, N>, &'b AicParams<N>)]);
+struct WholeTasks<'a, 'b, 'w, const N: usize> {
+    runs: &'a [(Run<'b, N>, &'b AicParams<N>)],
+    watch: Option<Watch<'w>>,
+}
 
-impl<const N: usize> Kernel for WholeTasks<'_, '_, N> {
+impl<const N: usize> Kernel for WholeTasks<'_, '_, '_, N> {
     type Output = Vec<Metrics>;
     #[inline(always)]
     fn run<T: Lanes>(self) -> Vec<Metrics> {
-        let Some((_, first)) = self.0.first() else { return Vec::new() };
-        let runs: Vec<Run<'_, N>> = self.0.iter().map(|(run, _)| *run).collect();
-        let controller = Aic::<N, T>::pack(|lane| self.0.get(lane).map_or(*first, |(_, params)| *params));
+        let Some((_, first)) = self.runs.first() else { return Vec::new() };
+        let runs: Vec<Run<'_, N>> = self.runs.iter().map(|(run, _)| *run).collect();
+        let controller = Aic::<N, T>::pack(|lane| self.runs.get(lane).map_or(*first, |(_, params)| *params));
         let mut bundle = Bundle::side_by_side(&runs, &controller);
-        while bundle.advance(&mut ()) == Progress::Running {}
-        (0..runs.len()).map(|lane| bundle.metrics_of(lane)).collect()
+        let mut watch = self.watch;
+        let mut look_at = watch.as_ref().map_or(u64::MAX, |watch| watch.every);
+        while bundle.advance(&mut ()) == Progress::Running {
+            if bundle.step < look_at {
+                continue;
+            }
+            let Some(watch) = &mut watch else { continue };
+            look_at = look_at.saturating_add(watch.every);
+            if !(watch.go_on)(&bundle.figures(runs.len())) {
+                break;
+            }
+        }
+        bundle.figures(runs.len())
     }
 }
 

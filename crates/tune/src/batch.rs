@@ -6,8 +6,12 @@
 //! Plants run in parallel on the current rayon pool and are collected in the order of their indices, so a result does not depend on the number of threads.
 
 use core::ops::Range;
+use core::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
 
-use certune_closed_loop::{KeyError, NoiseStream, Plant, PlantError, Run, Scenario, Task, simulate_many};
+use certune_closed_loop::{
+    KeyError, Metrics, NoiseStream, Plant, PlantError, Run, Scenario, Task, simulate_many, simulate_many_while,
+};
 use certune_control::aic::AicParams;
 use certune_dynamics::Robot;
 use certune_simd::InstructionSet;
@@ -21,6 +25,9 @@ use crate::score;
 use crate::search::Objective;
 use crate::streams;
 use crate::tune::Judge;
+
+/// How often, in simulated time, somebody looks whether a batch still has a chance, s.
+const LOOK_EVERY_S: f64 = 0.5;
 
 /// Why a scenario gives no batch.
 #[derive(Debug, thiserror::Error)]
@@ -92,23 +99,88 @@ impl<const N: usize> Batch<N> {
         NoiseStream { seed: self.seed, index }
     }
 
+    /// Plants with the noise and the gains that they run with.
+    fn runs<'a>(
+        &'a self,
+        plants: &'a [(u64, Plant<N>)],
+        params: &'a AicParams<N>,
+    ) -> Vec<(Run<'a, N>, &'a AicParams<N>)> {
+        let run =
+            |(index, plant): &'a (u64, Plant<N>)| (Run { plant, task: &self.task, noise: self.noise(*index) }, params);
+        plants.iter().map(run).collect()
+    }
+
     /// One run on each plant. Costs one simulation of the scenario per plant.
     pub fn run(&self, params: &AicParams<N>) -> Vec<PlantResult> {
         // As many plants at a time as run side by side.
         self.plants
             .par_chunks(InstructionSet::widest().lanes())
             .flat_map_iter(|plants| {
-                let runs: Vec<_> = plants
-                    .iter()
-                    .map(|(index, plant)| (Run { plant, task: &self.task, noise: self.noise(*index) }, params))
-                    .collect();
-                simulate_many(&runs).into_iter().zip(plants).map(|(metrics, (index, _))| PlantResult {
+                let found = simulate_many(&self.runs(plants, params));
+                found.into_iter().zip(plants).map(|(metrics, (index, _))| PlantResult {
                     plant: *index,
                     outcome: score::of_run(&metrics, &self.start_rad, self.task.step_s),
                     figures: score::figures(&metrics),
                 })
             })
             .collect()
+    }
+
+    /// What the plants say together, given up once that is known to be worse than `enough`: every [`LOOK_EVERY_S`] each bundle of plants writes down what its
+    /// runs cost at least, and all stop when the plants together cost too much, or one has diverged.
+    ///
+    /// Which thread sees it first depends on the hour; the answer does not, as whatever is worse than `enough` is answered alike.
+    pub fn outcome(&self, params: &AicParams<N>, enough: Option<Finite>) -> Outcome {
+        let Some(enough) = enough else {
+            return score::of_batch(self.run(params).iter().map(|plant| plant.outcome));
+        };
+        let step_s = self.task.step_s;
+        let goal_steps: Vec<u64> = self.task.segments.iter().map(|segment| segment.steps).collect();
+        let every = ((LOOK_EVERY_S / step_s).round() as u64).max(1);
+        let lanes = InstructionSet::widest().lanes();
+        let at_least_s = Mutex::new(vec![0.0; self.plants.len()]);
+        let stopped = AtomicBool::new(false);
+        let bundle = |(place, plants): (usize, &[(u64, Plant<N>)])| {
+            let mut go_on = |first: usize, found: &[Metrics]| {
+                let mut costs = at_least_s.lock().unwrap_or_else(PoisonError::into_inner);
+                for (cost, metrics) in costs[place + first..].iter_mut().zip(found) {
+                    *cost = score::of_run_so_far_s(metrics, &self.start_rad, step_s, &goal_steps);
+                }
+                let diverged = found.iter().any(|metrics| metrics.diverged_at_s.is_some());
+                if diverged || score::of_batch_so_far_s(&costs) > enough.get() {
+                    stopped.store(true, Ordering::Relaxed);
+                }
+                !stopped.load(Ordering::Relaxed)
+            };
+            let found = if stopped.load(Ordering::Relaxed) {
+                Vec::new()
+            } else {
+                simulate_many_while(&self.runs(plants, params), every, &mut go_on)
+            };
+            found.into_iter().map(|metrics| score::of_run(&metrics, &self.start_rad, step_s)).collect::<Vec<_>>()
+        };
+        // The worse half decides the cost, so no thread begins with the other before this one is done.
+        let half = self.plants.len().div_ceil(2).next_multiple_of(lanes);
+        let mut outcomes: Vec<Outcome> = Vec::with_capacity(self.plants.len());
+        for (index, plants) in self.plants.chunks(half).enumerate() {
+            let bundles = plants.par_chunks(lanes).enumerate();
+            outcomes.par_extend(bundles.flat_map_iter(|(at, plants)| bundle((index * half + at * lanes, plants))));
+        }
+        let outcome = score::of_batch(outcomes);
+        if stopped.into_inner() || outcome > (Outcome::Simulated { cost: enough }) {
+            return Outcome::Stopped { cost_above: enough };
+        }
+        outcome
+    }
+
+    /// Puts the plants on which `params` fare worst first; what they say together stays the same.
+    #[must_use]
+    pub fn hardest_first(mut self, params: &AicParams<N>) -> Self {
+        let mut found: Vec<(Outcome, (u64, Plant<N>))> =
+            self.run(params).iter().map(|plant| plant.outcome).zip(core::mem::take(&mut self.plants)).collect();
+        found.sort_by(|(a, _), (b, _)| b.cmp(a));
+        self.plants = found.into_iter().map(|(_, plant)| plant).collect();
+        self
     }
 
     fn params(&self, gains: &Gains) -> Option<AicParams<N>> {
@@ -155,6 +227,15 @@ impl<const N: usize> AicObjective<N> {
         Ok(Self { batch, filter })
     }
 
+    /// The plants on which `gains` fare worst come first, so that a candidate that is not good enough is known soon. Outcomes do not change.
+    #[must_use]
+    pub fn hardest_first(mut self, gains: &Gains) -> Self {
+        if let Some(params) = self.batch.params(gains) {
+            self.batch = self.batch.hardest_first(&params);
+        }
+        self
+    }
+
     /// The plants.
     pub const fn batch(&self) -> &Batch<N> {
         &self.batch
@@ -167,12 +248,12 @@ impl<const N: usize> AicObjective<N> {
 }
 
 impl<const N: usize> Objective for AicObjective<N> {
-    fn evaluate(&self, gains: &Gains) -> Outcome {
+    fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
         let Some(params) = self.batch.params(gains) else { return no_controller() };
         let growth_per_s = self.filter.growth_per_s(&params);
         if growth_per_s.get() >= 0.0 {
             return Outcome::Unstable { abscissa_per_s: growth_per_s };
         }
-        score::of_batch(self.batch.run(&params).iter().map(|plant| plant.outcome))
+        self.batch.outcome(&params, enough)
     }
 }

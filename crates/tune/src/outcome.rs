@@ -1,14 +1,14 @@
 //! What became of a candidate, and which of two fates is better.
 //!
 //! ```text
-//! Certified(cost) < Simulated(cost) < Uncertified(cost) < Unstable(abscissa) < Diverged(time)
+//! Certified(cost) < Simulated(cost) < Stopped(cost) < Uncertified(cost) < Unstable(abscissa) < Diverged(time)
 //! ```
 //!
 //! The order is total: within a rank a lower cost, a smaller abscissa or a *later* divergence is better, and every number is
 //! [`Finite`], so that no comparison meets NaN. A failure is never a cost with a penalty added, since a penalty has a size that somebody must
 //! choose and a good candidate can be beaten by it.
 //!
-//! A solver of argmin compares `f64`. [`Outcome::score`] embeds the order in the interval `[0, 5)`: rank `r` occupies `[r, r + 1)`,
+//! A solver of argmin compares `f64`. [`Outcome::score`] embeds the order in the interval `[0, 6)`: rank `r` occupies `[r, r + 1)`,
 //! and inside a rank the 64 bits of a finite number, read as an integer that increases with the number, are divided by 2^64. That
 //! scale is piecewise logarithmic, one octave per 2^-12, so it separates costs by their ratio:
 //! - it never reverses the order of two outcomes;
@@ -92,7 +92,7 @@ impl Ord for Finite {
     }
 }
 
-/// What became of a candidate; `a < b` reads "a is better than b".
+/// What became of a candidate; `a < b` reads "a is better than b", except that a stopped candidate was worse than its number, and by how much nobody knows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "rank", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Outcome {
@@ -105,6 +105,11 @@ pub enum Outcome {
     Simulated {
         /// Cost, in the unit of the run's objective: s for the settling cost.
         cost: Finite,
+    },
+    /// Given up as soon as it was known to be no better than this: what it would have cost, or how it would have failed, could not change the search.
+    Stopped {
+        /// The batch costs more than this, or has none.
+        cost_above: Finite,
     },
     /// Finished the task, or stable in the sample, but the certificate was refused.
     Uncertified {
@@ -129,9 +134,10 @@ impl Outcome {
         match self {
             Self::Certified { .. } => 0,
             Self::Simulated { .. } => 1,
-            Self::Uncertified { .. } => 2,
-            Self::Unstable { .. } => 3,
-            Self::Diverged { .. } => 4,
+            Self::Stopped { .. } => 2,
+            Self::Uncertified { .. } => 3,
+            Self::Unstable { .. } => 4,
+            Self::Diverged { .. } => 5,
         }
     }
 
@@ -139,12 +145,13 @@ impl Outcome {
     const fn key(self) -> u64 {
         match self {
             Self::Certified { cost } | Self::Simulated { cost } | Self::Uncertified { cost } => cost.key(),
+            Self::Stopped { cost_above } => cost_above.key(),
             Self::Unstable { abscissa_per_s } => abscissa_per_s.key(),
             Self::Diverged { at_s } => !at_s.key(),
         }
     }
 
-    /// The place of the outcome on a line, in `[0, 5)`, lower is better: see the [module](self).
+    /// The place of the outcome on a line, in `[0, 6)`, lower is better: see the [module](self).
     pub fn score(self) -> f64 {
         f64::from(self.rank()) + self.key() as f64 * KEY_UNIT
     }
@@ -153,7 +160,7 @@ impl Outcome {
     pub const fn cost(self) -> Option<f64> {
         match self {
             Self::Certified { cost } | Self::Simulated { cost } | Self::Uncertified { cost } => Some(cost.get()),
-            Self::Unstable { .. } | Self::Diverged { .. } => None,
+            Self::Stopped { .. } | Self::Unstable { .. } | Self::Diverged { .. } => None,
         }
     }
 }
@@ -192,11 +199,12 @@ mod tests {
     }
 
     fn outcome() -> impl Strategy<Value = Outcome> {
-        (0..5, number()).prop_map(|(rank, x)| match rank {
+        (0..6, number()).prop_map(|(rank, x)| match rank {
             0 => Outcome::Certified { cost: x },
             1 => Outcome::Simulated { cost: x },
-            2 => Outcome::Uncertified { cost: x },
-            3 => Outcome::Unstable { abscissa_per_s: x },
+            2 => Outcome::Stopped { cost_above: x },
+            3 => Outcome::Uncertified { cost: x },
+            4 => Outcome::Unstable { abscissa_per_s: x },
             _ => Outcome::Diverged { at_s: x },
         })
     }
@@ -218,7 +226,7 @@ mod tests {
 
         #[test]
         fn the_score_never_reverses_the_order(a in outcome(), b in outcome()) {
-            prop_assert!((0.0..5.0).contains(&a.score()));
+            prop_assert!((0.0..6.0).contains(&a.score()));
             if a < b {
                 prop_assert!(a.score() <= b.score(), "{a:?} {b:?}");
             }

@@ -85,6 +85,32 @@ pub fn of_run(metrics: &Metrics, start_rad: &[f64], step_s: f64) -> Outcome {
     Outcome::Simulated { cost: Finite::saturating(sum_s / metrics.segments.len().max(1) as f64) }
 }
 
+/// A cost that the run cannot end below, s: that of its figures so far. `goal_steps` tells how long each goal of the task stands, in samples.
+///
+/// Lag, overshoot and saturation of a goal only grow while it stands; jitter is a mean square, which is spread over the goal's whole time here.
+pub fn of_run_so_far_s(metrics: &Metrics, start_rad: &[f64], step_s: f64, goal_steps: &[u64]) -> f64 {
+    let mut previous = start_rad;
+    let mut sum_s = 0.0;
+    for (segment, steps) in metrics.segments.iter().zip(goal_steps) {
+        let parts = Parts::of(segment, previous, step_s);
+        // One rate fewer than samples, as in a run's first goal: elsewhere that is below the true share.
+        let rates = ((segment.duration_s / step_s).round() - 1.0).max(0.0);
+        let share = (rates / (steps.saturating_sub(1).max(1)) as f64).min(1.0);
+        sum_s += Parts { jitter_s: parts.jitter_s * share.sqrt(), ..parts }.total_s();
+        previous = &segment.goal_rad;
+    }
+    // The last digits of the sums above are not those of the sums at the end.
+    sum_s / goal_steps.len().max(1) as f64 * (1.0 - 1e-12)
+}
+
+/// A cost that a batch cannot end below, s, from such costs of its plants; 0 for a plant that nobody has seen yet.
+pub fn of_batch_so_far_s(plants: &[f64]) -> f64 {
+    let mut costs = plants.to_vec();
+    costs.sort_unstable_by(|a, b| b.total_cmp(a));
+    let half = costs.len().div_ceil(2);
+    costs[..half].iter().sum::<f64>() / half.max(1) as f64 * (1.0 - 1e-12)
+}
+
 /// The outcome of a batch: the mean cost of its worse half, rounded up; the worst outcome if a plant has no cost.
 ///
 /// The order of `plants` does not matter, to the bit. An empty batch proves nothing and counts as diverged at once.

@@ -106,7 +106,7 @@ pub fn tune<C, R: Display>(
     let mut run = search(space, start, &question.search, objective, progress)?;
     let start = start.map(|_| 0);
     let (certification, winner) =
-        certify_best(&mut run, space, start, question.certification_attempts, progress, certify);
+        certify_best(&mut run, space, objective, start, question.certification_attempts, progress, certify);
 
     progress.stage(Stage::Judge);
     let winner_index = winner.as_ref().map(|(index, _)| *index);
@@ -130,47 +130,66 @@ pub fn tune<C, R: Display>(
     Ok(Tuned { record, certificate: winner.map(|(_, certificate)| certificate) })
 }
 
-/// Brings candidates before `certify` and writes the verdicts into their outcomes.
+/// Brings candidates before `certify`, and writes the verdicts into their outcomes.
 fn certify_best<C, R: Display>(
     run: &mut SearchRun,
     space: &Space,
+    objective: &dyn Objective,
     start: Option<usize>,
     attempts: usize,
     progress: &dyn TuneProgress,
     mut certify: impl FnMut(&Gains) -> Result<C, R>,
 ) -> (Vec<Attempt>, Option<(usize, C)>) {
-    let hopeful =
-        |evaluation: &&Evaluation| matches!(evaluation.outcome, Outcome::Certified { .. } | Outcome::Simulated { .. });
-    let queue: Vec<Evaluation> = run.ranked().into_iter().filter(hopeful).copied().collect();
-    let last_resort: Vec<Evaluation> =
-        queue.iter().filter(|candidate| Some(candidate.index) == start).copied().collect();
     let mut visits: Vec<Attempt> = Vec::new();
+    let mut visit = |candidate: &mut Evaluation, visits: &mut Vec<Attempt>| {
+        let (Outcome::Certified { cost } | Outcome::Simulated { cost }) = candidate.outcome else { return None };
+        progress.stage(Stage::Certify { attempt: visits.len() + 1, candidate });
+        let (outcome, refusal, certificate) = match certify(&candidate.gains) {
+            Ok(certificate) => (Outcome::Certified { cost }, None, Some(certificate)),
+            Err(reason) => (Outcome::Uncertified { cost }, Some(reason.to_string()), None),
+        };
+        visits.push(Attempt { evaluation: candidate.index, refusal });
+        candidate.outcome = outcome;
+        certificate
+    };
     let mut refused: Vec<Vec<f64>> = Vec::new();
-    for (candidate, is_last_resort) in
-        queue.iter().map(|candidate| (candidate, false)).chain(last_resort.iter().map(|candidate| (candidate, true)))
+    let mut waiting: Vec<usize> = (0..run.evaluations.len()).collect();
+    while visits.len() < attempts
+        && let Some(index) = take_best(run, &mut waiting, objective)
     {
-        let point = space.encode(&candidate.gains);
-        let visited = visits.iter().any(|visit| visit.evaluation == candidate.index);
-        let hopeless = visits.len() >= attempts || refused.iter().any(|other| are_neighbours(other, &point));
-        if visited || (hopeless && !is_last_resort) {
+        let point = space.encode(&run.evaluations[index].gains);
+        if refused.iter().any(|other| are_neighbours(other, &point)) {
             continue;
         }
-        progress.stage(Stage::Certify { attempt: visits.len() + 1, candidate });
-        let (Outcome::Certified { cost } | Outcome::Simulated { cost }) = candidate.outcome else { continue };
-        match certify(&candidate.gains) {
-            Ok(certificate) => {
-                visits.push(Attempt { evaluation: candidate.index, refusal: None });
-                run.evaluations[candidate.index].outcome = Outcome::Certified { cost };
-                return (visits, Some((candidate.index, certificate)));
-            }
-            Err(reason) => {
-                visits.push(Attempt { evaluation: candidate.index, refusal: Some(reason.to_string()) });
-                run.evaluations[candidate.index].outcome = Outcome::Uncertified { cost };
-                refused.push(point);
-            }
+        if let Some(certificate) = visit(&mut run.evaluations[index], &mut visits) {
+            return (visits, Some((index, certificate)));
         }
+        refused.push(point);
     }
-    (visits, None)
+    let last_resort = start.filter(|start| visits.iter().all(|visit| visit.evaluation != *start));
+    let certified = last_resort.and_then(|index| Some((index, visit(&mut run.evaluations[index], &mut visits)?)));
+    (visits, certified)
+}
+
+/// Takes the best of the candidates in `waiting` that may be certified; of equals the earlier. A stopped one whose turn comes is evaluated to its end first.
+fn take_best(run: &mut SearchRun, waiting: &mut Vec<usize>, objective: &dyn Objective) -> Option<usize> {
+    loop {
+        let place = |index: usize| {
+            let (number, is_exact) = match run.evaluations[index].outcome {
+                Outcome::Certified { cost } | Outcome::Simulated { cost } => (cost, true),
+                Outcome::Stopped { cost_above } => (cost_above, false),
+                Outcome::Uncertified { .. } | Outcome::Unstable { .. } | Outcome::Diverged { .. } => return None,
+            };
+            Some((number, is_exact, index))
+        };
+        let (_, is_exact, index) = waiting.iter().filter_map(|index| place(*index)).min()?;
+        if is_exact {
+            waiting.retain(|other| *other != index);
+            return Some(index);
+        }
+        let evaluation = &mut run.evaluations[index];
+        evaluation.outcome = objective.evaluate(&evaluation.gains, None);
+    }
 }
 
 fn are_neighbours(a: &[f64], b: &[f64]) -> bool {
@@ -180,7 +199,7 @@ fn are_neighbours(a: &[f64], b: &[f64]) -> bool {
 /// What a change of each free gain by ±10 % does to the outcome; the bounds of the space do not apply. Costs two evaluations per free gain.
 pub fn sensitivity(space: &Space, objective: &dyn Objective, gains: &Gains) -> Vec<Sensitivity> {
     let free: Vec<_> = space.free().map(|(gain, _)| gain).collect();
-    let outcome = |gain, factor: f64| objective.evaluate(&gains.with(gain, gains.get(gain) * factor));
+    let outcome = |gain, factor: f64| objective.evaluate(&gains.with(gain, gains.get(gain) * factor), None);
     free.into_par_iter()
         .map(|gain| Sensitivity {
             gain,

@@ -8,8 +8,8 @@ use certune_control::aic::AicParams;
 use certune_dynamics::Robot;
 use certune_tune::filter::DEFAULT_SAMPLES;
 use certune_tune::{
-    AicObjective, Batch, BatchError, Bench, Gain, Gains, Judge, Method, Objective, ObjectiveName, Outcome, Question,
-    SearchSettings, Space, tune,
+    AicObjective, Batch, BatchError, Bench, Finite, Gain, Gains, Judge, Method, Objective, ObjectiveName, Outcome,
+    Question, SearchSettings, Space, tune,
 };
 
 const SCENARIO: &str = include_str!("../../../tuning/scenarios/pick-and-place.toml");
@@ -57,10 +57,14 @@ fn what_the_filter_rejects_runs_away_or_never_settles() {
     let robot = Robot::panda();
     let scenario = scenario(1, 6.0);
     let objective = AicObjective::<7>::new(&robot, &scenario, 1, 2, DEFAULT_SAMPLES).unwrap();
-    assert!(matches!(objective.evaluate(&published()), Outcome::Simulated { .. }));
+    assert!(matches!(objective.evaluate(&published(), None), Outcome::Simulated { .. }));
     // The published reference behaviour: sigma_dq = 5 runs away.
     let restless = published().with(Gain::SigmaDq, 5.0);
-    assert!(matches!(objective.evaluate(&restless), Outcome::Unstable { .. }), "{:?}", objective.evaluate(&restless));
+    assert!(
+        matches!(objective.evaluate(&restless, None), Outcome::Unstable { .. }),
+        "{:?}",
+        objective.evaluate(&restless, None)
+    );
     let verdict = objective.batch().judge(&restless);
     let settles = |figures: &certune_tune::Figures| figures.settling_time_s.is_some();
     assert!(
@@ -86,7 +90,7 @@ fn the_filter_sees_the_slowest_mode_and_an_euler_step_that_is_too_long() {
 #[test]
 fn gains_that_make_no_controller_are_the_worst_outcome() {
     let objective = AicObjective::<7>::new(&Robot::panda(), &scenario(1, 0.1), 1, 1, 3).unwrap();
-    let none = objective.evaluate(&published().with(Gain::SigmaMu, 0.0));
+    let none = objective.evaluate(&published().with(Gain::SigmaMu, 0.0), None);
     assert!(matches!(none, Outcome::Diverged { at_s } if at_s.get() == 0.0), "{none:?}");
 }
 
@@ -112,8 +116,54 @@ fn gains_per_joint_are_no_start_and_the_error_names_the_gain() {
     assert!(error.to_string().contains("sigma_q"), "{error}");
 }
 
+#[test]
+fn a_candidate_is_given_up_exactly_when_it_is_worse_than_what_is_enough() {
+    let objective =
+        AicObjective::<7>::new(&Robot::panda(), &scenario(2, 3.0), 3, 6, 3).unwrap().hardest_first(&published());
+    let slow = published().with(Gain::KappaA, 300.0);
+    for gains in [published(), slow, published().with(Gain::SigmaDmu, 5.0)] {
+        let exact = objective.evaluate(&gains, None);
+        let Outcome::Simulated { cost } = exact else { panic!("{exact:?}") };
+        for factor in [0.1, 0.5, 0.9, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 2.0] {
+            let enough = Finite::saturating(cost.get() * factor);
+            let expected = if cost > enough { Outcome::Stopped { cost_above: enough } } else { exact };
+            assert_eq!(objective.evaluate(&gains, Some(enough)), expected, "{factor}");
+        }
+    }
+}
+
+#[test]
+fn the_order_of_the_plants_does_not_change_an_outcome() {
+    let objective = AicObjective::<7>::new(&Robot::panda(), &scenario(1, 2.0), 3, 6, 3).unwrap();
+    let sorted = objective.clone().hardest_first(&published());
+    let order =
+        |objective: &AicObjective<7>| objective.batch().plants().iter().map(|(index, _)| *index).collect::<Vec<_>>();
+    assert_ne!(order(&objective), order(&sorted), "a batch that is sorted by chance tests nothing");
+    let gains = published().with(Gain::KappaA, 500.0);
+    assert_eq!(objective.evaluate(&gains, None), sorted.evaluate(&gains, None));
+}
+
+#[test]
+fn stopping_early_changes_no_candidate_and_no_winner() {
+    let with = run(Method::ParticleSwarm, 2, true);
+    let without = run(Method::ParticleSwarm, 2, false);
+    let gains =
+        |record: &certune_tune::RunRecord| record.evaluations.iter().map(|found| found.gains).collect::<Vec<_>>();
+    assert_eq!(gains(&with), gains(&without));
+    assert_eq!((with.winner, with.tuned()), (without.winner, without.tuned()));
+    let stopped = |outcome: &Outcome| matches!(outcome, Outcome::Stopped { .. });
+    let count = |record: &certune_tune::RunRecord| record.evaluations.iter().filter(|e| stopped(&e.outcome)).count();
+    assert_eq!(count(&without), 0);
+    assert!(count(&with) > 2, "{} of {}", count(&with), with.evaluations.len());
+    for (with, without) in with.evaluations.iter().zip(&without.evaluations).filter(|(with, _)| stopped(&with.outcome))
+    {
+        let Outcome::Stopped { cost_above } = with.outcome else { unreachable!() };
+        assert!(without.outcome > Outcome::Simulated { cost: cost_above });
+    }
+}
+
 /// A small tuning run: one goal, two plants.
-fn run(method: Method, threads: usize) -> certune_tune::RunRecord {
+fn run(method: Method, threads: usize, stop_early: bool) -> certune_tune::RunRecord {
     let robot = Robot::panda();
     let scenario = scenario(1, 4.0);
     let space = Space::parse(Path::new("panda-aic.toml"), SPACE).expect("the shipped space");
@@ -123,7 +173,7 @@ fn run(method: Method, threads: usize) -> certune_tune::RunRecord {
         scenario: scenario.name.clone(),
         versions: BTreeMap::new(),
         objective: ObjectiveName::SettlingCost,
-        search: SearchSettings { particles: 6, ..SearchSettings::new(method, 24, 5) },
+        search: SearchSettings { particles: 6, stop_early, ..SearchSettings::new(method, 36, 5) },
         batch_plants: 2,
         held_out_plants: 3,
         certification_attempts: 3,
@@ -138,16 +188,16 @@ fn run(method: Method, threads: usize) -> certune_tune::RunRecord {
 
 #[test]
 fn nelder_mead_beats_the_published_gains_on_plants_it_never_met_and_threads_do_not_matter() {
-    let one = run(Method::NelderMead, 1);
+    let one = run(Method::NelderMead, 1, true);
     let (start, tuned) = (one.held_out.start.as_ref().unwrap(), one.held_out.tuned.as_ref().unwrap());
     assert!(tuned.outcome.cost().unwrap() < 0.97 * start.outcome.cost().unwrap(), "{start:?} {tuned:?}");
     let text = |record| serde_json::to_string_pretty(record).unwrap();
-    assert_eq!(text(&one), text(&run(Method::NelderMead, 2)));
+    assert_eq!(text(&one), text(&run(Method::NelderMead, 2, true)));
 }
 
 #[test]
 fn a_cold_swarm_gives_the_same_record_for_any_number_of_threads() {
-    let text = |threads| serde_json::to_string_pretty(&run(Method::ParticleSwarm, threads)).unwrap();
+    let text = |threads| serde_json::to_string_pretty(&run(Method::ParticleSwarm, threads, true)).unwrap();
     let one = text(1);
     assert_eq!(one, text(2));
     assert_eq!(one, text(4));

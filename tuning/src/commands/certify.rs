@@ -2,7 +2,7 @@
 
 use certune::certify::GoalListValues;
 use certune::closed_loop::{Gains, LawName, PlantBox, Scenario};
-use certune::dynamics::{Link, Robot, for_joint_count};
+use certune::dynamics::{Link, Robot};
 use certune::verify::{Certificate, ConfigurationSet, Evidence, Record};
 use certune::{Answer, ArmCertifier, ArmGains, Growth, Over, Request, certificate_text, family_of};
 use serde::Serialize;
@@ -14,6 +14,7 @@ use crate::cli::{ArmsArgs, CertifyArgs, Context, Exit, OverName, Switch};
 use crate::error::Error;
 use crate::output;
 use crate::progress::Terminal;
+use crate::sizes::for_joint_count;
 use crate::values::Numbers;
 
 /// The controller's step, s: that of the sampled claims and of the check of the gains.

@@ -1,6 +1,6 @@
 //! `autotune constants`: the constants of an arm, proved, and stored as a record that claims can rest on.
 
-use certune::dynamics::{Robot, for_joint_count};
+use certune::dynamics::Robot;
 use certune::verify::{Number, Record};
 use certune::{ProvingEffort, ProvingTask, prove_constants};
 use serde::Serialize;
@@ -11,6 +11,7 @@ use crate::cli::{ConstantsArgs, Context, EffortName, Exit};
 use crate::error::Error;
 use crate::output;
 use crate::progress::Terminal;
+use crate::sizes::for_joint_count;
 
 #[derive(Debug, Serialize)]
 struct Summary<'a> {

@@ -1,8 +1,8 @@
 //! `autotune inspect`: the arm's dynamics at one state.
 
 use certune::dynamics::{
-    Joints, Model, Robot, State, coriolis_torque, flange_pose, for_joint_count, forward_dynamics, friction_torque,
-    gravity_jacobian, gravity_torque, mass_matrix,
+    Joints, Model, Robot, State, coriolis_torque, flange_pose, forward_dynamics, friction_torque, gravity_jacobian,
+    gravity_torque, mass_matrix,
 };
 use serde::Serialize;
 
@@ -10,6 +10,7 @@ use crate::catalogue;
 use crate::cli::{Context, Exit, InspectArgs};
 use crate::error::Error;
 use crate::output::{self, number, table};
+use crate::sizes::for_joint_count;
 use crate::values::Numbers;
 
 #[derive(Debug, Serialize)]

@@ -1,6 +1,5 @@
 //! `autotune report`: the page of a run again, from its folder.
 
-use certune::dynamics::for_joint_count;
 use serde::Serialize;
 
 use crate::catalogue;
@@ -9,6 +8,7 @@ use crate::error::Error;
 use crate::output;
 use crate::page;
 use crate::run::Folder;
+use crate::sizes::for_joint_count;
 
 #[derive(Debug, Serialize)]
 struct Summary {

@@ -8,13 +8,14 @@ use certune::closed_loop::{
 use certune::control::Controller;
 use certune::control::aic::Aic;
 use certune::control::mrac::Mrac;
-use certune::dynamics::{Robot, for_joint_count};
+use certune::dynamics::Robot;
 use serde::Serialize;
 
 use crate::catalogue::{self, GainsSource};
 use crate::cli::{Context, Exit, SimulateArgs, Switch};
 use crate::error::Error;
 use crate::output::{self, number, table};
+use crate::sizes::for_joint_count;
 
 /// Rows of the CSV file: one each so many samples, 10 ms at 1 kHz.
 const CSV_EVERY: u64 = 10;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use certune::certify::FamilyValues;
 use certune::closed_loop::Scenario;
-use certune::dynamics::{Robot, for_joint_count};
+use certune::dynamics::Robot;
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::{
     AicObjective, Batch, BatchError, Bench, Evaluation, Gains, HeldOut, Objective, ObjectiveName, Outcome, Question,
@@ -23,12 +23,13 @@ use crate::output::{self, number, table};
 use crate::page::{self, Spread, spread};
 use crate::progress::{Terminal, achieved};
 use crate::run::{Folder, Run, RunFile};
+use crate::sizes::for_joint_count;
 use crate::versions::versions;
 
 const DEFAULT_BUDGET: usize = 100;
 const DEFAULT_SEED: u64 = 1;
 /// Plants on which every candidate is simulated.
-const BATCH_PLANTS: usize = 8;
+const DEFAULT_PLANTS: usize = 8;
 /// Plants that judge start and winner.
 const HELD_OUT_PLANTS: usize = 32;
 /// Candidates brought before the certifier at most.
@@ -140,7 +141,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
             versions: versions(),
             objective: args.objective.unwrap_or_else(|| space.objective()),
             search: SearchSettings::new(space.method(), budget, seed),
-            batch_plants: BATCH_PLANTS,
+            batch_plants: args.plants.unwrap_or(DEFAULT_PLANTS),
             held_out_plants: HELD_OUT_PLANTS,
             certification_attempts: ATTEMPTS,
         },
@@ -185,8 +186,9 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
         progress.begin("sampling the arm's constants");
         certifier.constants();
     }
-    let simulated =
-        AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
+    let simulated = AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES)
+        .map_err(misfit)?
+        .hardest_first(&plan.start);
     let certified = CertifiedObjective::new(question.objective, &certifier, (robot, scenario), seed, DEFAULT_SAMPLES)
         .map_err(misfit)?;
     let objective: &dyn Objective = match &certified {

@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use certune::bounds::recheck;
-use certune::dynamics::for_joint_count;
 use certune::verify::{Certificate, Evidence, Record, Rejection, verify};
 use serde::Serialize;
 
@@ -13,6 +12,7 @@ use crate::cli::{Context, Exit, VerifyArgs};
 use crate::error::Error;
 use crate::output;
 use crate::progress::Terminal;
+use crate::sizes::for_joint_count;
 
 /// One file for `--json`.
 #[derive(Debug, Serialize)]

@@ -198,6 +198,7 @@ fn search(record: &RunRecord) -> SearchRecord {
         let outcome = match evaluation.outcome {
             Outcome::Certified { .. } => "certified",
             Outcome::Simulated { .. } => "simulated, certificate not asked for",
+            Outcome::Stopped { .. } => "given up as no better",
             Outcome::Uncertified { .. } => "certificate refused",
             Outcome::Unstable { .. } => "unstable",
             Outcome::Diverged { .. } => "diverged",

@@ -96,6 +96,8 @@ const CASES: &[(&str, i32, &[&str])] = &[
     ("--robot panda --budget many", 1, &["many", "--budget"]),
     ("--robot panda --seed -1", 1, &["-1"]),
     ("--robot panda --threads 0", 1, &["at least 1 thread"]),
+    ("--robot panda --plants 0", 1, &["at least 1 plant"]),
+    ("--robot panda --plants few", 1, &["few", "--plants"]),
     ("--robot panda --controller pid", 1, &["pid", "aic"]),
     ("--robot panda --controller mrac", 1, &["mrac", "simulate"]),
     ("verify", 1, &["CERTIFICATE.json"]),

@@ -55,7 +55,8 @@ impl<'a, const N: usize> CertifiedObjective<'a, N> {
 }
 
 impl<const N: usize> Objective for CertifiedObjective<'_, N> {
-    fn evaluate(&self, gains: &Gains) -> Outcome {
+    // A certificate is all or nothing: it cannot be given up half way.
+    fn evaluate(&self, gains: &Gains, _: Option<Finite>) -> Outcome {
         let gains = gains.on_every_joint();
         let Ok(params) = AicParams::new(&gains, self.step_s) else {
             return Outcome::Diverged { at_s: Finite::saturating(0.0) };

@@ -6,8 +6,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use argmin::core::{CostFunction, Error, SendAlias, SyncAlias};
 use rayon::prelude::*;
 
-use super::{Evaluation, Objective, Phase, Progress};
+use super::{Evaluation, Objective, Phase, Progress, SearchSettings};
 use crate::gains::Gains;
+use crate::outcome::{Finite, Outcome};
 use crate::space::Space;
 
 /// The answer to a request for one evaluation more than the budget holds; it ends the solver's run.
@@ -23,11 +24,19 @@ struct Book {
     phase: Phase,
 }
 
+/// A candidate to be evaluated; `known` is its index when it was stopped too early before.
+struct Task {
+    gains: Gains,
+    enough: Option<Finite>,
+    known: Option<usize>,
+}
+
 pub(super) struct Ledger<'a> {
     space: &'a Space,
     objective: &'a dyn Objective,
     progress: &'a dyn Progress,
     budget: usize,
+    stop_early: bool,
     book: Mutex<Book>,
 }
 
@@ -36,10 +45,11 @@ impl<'a> Ledger<'a> {
         space: &'a Space,
         objective: &'a dyn Objective,
         progress: &'a dyn Progress,
-        budget: usize,
+        settings: &SearchSettings,
     ) -> Self {
         let book = Book { evaluations: Vec::new(), known: HashMap::new(), best: 0, phase: Phase::Start };
-        Self { space, objective, progress, budget, book: Mutex::new(book) }
+        let (budget, stop_early) = (settings.evaluations, settings.stop_early);
+        Self { space, objective, progress, budget, stop_early, book: Mutex::new(book) }
     }
 
     /// The book is whole between any two statements that change it, so a panic elsewhere does not spoil it.
@@ -74,65 +84,91 @@ impl<'a> Ledger<'a> {
 
     /// Evaluates the start exactly as it was given, unrounded.
     pub(super) fn evaluate_start(&self, start: Gains) -> Result<(), BudgetSpent> {
-        self.evaluate(&[start]).map(|_| ())
+        self.evaluate(&[start], |_| None).map(|_| ())
     }
 
-    /// The scores at `points`, evaluated in parallel and recorded in order. A point whose gains are known costs nothing.
+    /// The exact scores at `points`.
     pub(super) fn scores(&self, points: &[&Vec<f64>]) -> Result<Vec<f64>, BudgetSpent> {
-        let candidates: Vec<Gains> = points.iter().map(|point| self.space.decode(point)).collect();
-        self.evaluate(&candidates)
+        Ok(self.outcomes(points, |_| None)?.into_iter().map(Outcome::score).collect())
     }
 
-    fn evaluate(&self, candidates: &[Gains]) -> Result<Vec<f64>, BudgetSpent> {
-        let mut fresh: Vec<Gains> = Vec::new();
+    /// The outcomes at `points`, evaluated in parallel and recorded in order. A point whose gains are known costs nothing.
+    ///
+    /// A point that is worse than its `enough` need not be known better than that.
+    pub(super) fn outcomes(
+        &self,
+        points: &[&Vec<f64>],
+        enough: impl Fn(usize) -> Option<Finite>,
+    ) -> Result<Vec<Outcome>, BudgetSpent> {
+        let candidates: Vec<Gains> = points.iter().map(|point| self.space.decode(point)).collect();
+        self.evaluate(&candidates, enough)
+    }
+
+    fn evaluate(
+        &self,
+        candidates: &[Gains],
+        enough: impl Fn(usize) -> Option<Finite>,
+    ) -> Result<Vec<Outcome>, BudgetSpent> {
+        let enough = |place: usize| if self.stop_early { enough(place) } else { None };
+        let mut tasks: Vec<Task> = Vec::new();
         {
             let book = self.book();
-            for candidate in candidates {
-                let bits = candidate.bits();
-                if !book.known.contains_key(&bits) && !fresh.iter().any(|other| other.bits() == bits) {
-                    fresh.push(*candidate);
+            let mut left = self.budget - book.evaluations.len();
+            for (place, gains) in candidates.iter().enumerate() {
+                let (bits, enough) = (gains.bits(), enough(place));
+                if let Some(task) = tasks.iter_mut().find(|task| task.gains.bits() == bits) {
+                    task.enough = task.enough.zip(enough).map(|(a, b)| a.max(b));
+                    continue;
                 }
+                let known = book.known.get(&bits).copied();
+                let settled = known.is_some_and(|index| match book.evaluations[index].outcome {
+                    Outcome::Stopped { cost_above } => enough.is_some_and(|enough| enough <= cost_above),
+                    _ => true,
+                });
+                if settled || (known.is_none() && left == 0) {
+                    continue;
+                }
+                left -= usize::from(known.is_none());
+                tasks.push(Task { gains: *gains, enough, known });
             }
         }
-        fresh.truncate(self.left());
         // Indexed, so that the outcomes come back in the order of the candidates whatever thread made them.
-        let outcomes: Vec<_> = fresh.par_iter().map(|gains| self.objective.evaluate(gains)).collect();
+        let outcomes: Vec<_> = tasks.par_iter().map(|task| self.objective.evaluate(&task.gains, task.enough)).collect();
 
         let mut book = self.book();
-        for (gains, outcome) in fresh.into_iter().zip(outcomes) {
-            let index = book.evaluations.len();
+        for (Task { gains, known, .. }, outcome) in tasks.into_iter().zip(outcomes) {
+            let index = known.unwrap_or(book.evaluations.len());
             let evaluation = Evaluation { index, phase: book.phase, gains, outcome };
-            book.evaluations.push(evaluation);
-            book.known.insert(gains.bits(), index);
+            if known.is_some() {
+                book.evaluations[index].outcome = outcome;
+            } else {
+                book.evaluations.push(evaluation);
+                book.known.insert(gains.bits(), index);
+            }
             if outcome < book.evaluations[book.best].outcome {
                 book.best = index;
             }
-            self.progress.evaluated(index + 1, self.budget, &evaluation, &book.evaluations[book.best]);
+            if known.is_none() {
+                self.progress.evaluated(index + 1, self.budget, &evaluation, &book.evaluations[book.best]);
+            }
         }
-        candidates
-            .iter()
-            .map(|candidate| {
-                let index = book.known.get(&candidate.bits()).ok_or(BudgetSpent)?;
-                Ok(book.evaluations[*index].outcome.score())
-            })
-            .collect()
+        let outcome = |gains: &Gains| {
+            let index = book.known.get(&gains.bits()).ok_or(BudgetSpent)?;
+            Ok(book.evaluations[*index].outcome)
+        };
+        candidates.iter().map(outcome).collect()
     }
 }
 
-/// A solver's view of the ledger: argmin takes its problem by value.
-pub(super) struct Problem<'a, 'b> {
-    pub(super) ledger: &'a Ledger<'b>,
-    /// What to do before a batch, such as to count a generation.
-    pub(super) before_batch: &'a (dyn Fn() + Sync),
-}
+/// A function from points to scores, as argmin wants its problem.
+pub(super) struct Problem<F>(pub(super) F);
 
-impl CostFunction for Problem<'_, '_> {
+impl<F: Fn(&[&Vec<f64>]) -> Result<Vec<f64>, BudgetSpent>> CostFunction for Problem<F> {
     type Param = Vec<f64>;
     type Output = f64;
 
     fn cost(&self, point: &Vec<f64>) -> Result<f64, Error> {
-        let scores = self.ledger.scores(&[point])?;
-        scores.first().copied().ok_or_else(|| BudgetSpent.into())
+        (self.0)(&[point])?.first().copied().ok_or_else(|| BudgetSpent.into())
     }
 
     fn bulk_cost<P>(&self, points: &[P]) -> Result<Vec<f64>, Error>
@@ -141,9 +177,8 @@ impl CostFunction for Problem<'_, '_> {
         f64: SendAlias,
         Self: SyncAlias,
     {
-        (self.before_batch)();
         let points: Vec<&Vec<f64>> = points.iter().map(std::borrow::Borrow::borrow).collect();
-        Ok(self.ledger.scores(&points)?)
+        Ok((self.0)(&points)?)
     }
 }
 

@@ -22,18 +22,21 @@ use serde::{Deserialize, Serialize};
 pub use nelder_mead::SPREAD;
 
 use crate::gains::Gains;
-use crate::outcome::Outcome;
+use crate::outcome::{Finite, Outcome};
 use crate::space::{Method, Space, SpaceError};
 use ledger::Ledger;
 
 /// What turns gains into an outcome. Total: an objective that fails says so by a rank of [`Outcome`].
 pub trait Objective: Sync {
-    /// The outcome of `gains`: a pure function of them.
-    fn evaluate(&self, gains: &Gains) -> Outcome;
+    /// The outcome of `gains`: a pure function of them and of `enough`.
+    ///
+    /// Whatever costs more than `enough`, or fails in simulation, may be answered with [`Outcome::Stopped`], as soon as that is sure.
+    fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome;
 }
 
+/// An objective that never stops early.
 impl<F: Fn(&Gains) -> Outcome + Sync> Objective for F {
-    fn evaluate(&self, gains: &Gains) -> Outcome {
+    fn evaluate(&self, gains: &Gains, _: Option<Finite>) -> Outcome {
         self(gains)
     }
 }
@@ -104,12 +107,14 @@ pub struct SearchSettings {
     pub particles: usize,
     /// Size of the first simplex along each coordinate, a fraction of the range in `(0, 0.5]`. Default 0.15.
     pub simplex_step: f64,
+    /// Whether a candidate is given up once its place no longer matters. Default true; the winner is the same either way.
+    pub stop_early: bool,
 }
 
 impl SearchSettings {
     /// Settings with the default swarm and simplex.
     pub const fn new(method: Method, evaluations: usize, seed: u64) -> Self {
-        Self { method, evaluations, seed, particles: 10, simplex_step: 0.15 }
+        Self { method, evaluations, seed, particles: 10, simplex_step: 0.15, stop_early: true }
     }
 }
 
@@ -187,7 +192,7 @@ pub fn search(
         return Err(SearchError::SimplexStep { simplex_step: settings.simplex_step });
     }
     let start = start.map(|gains| space.admit(gains)).transpose()?;
-    let ledger = Ledger::new(space, objective, progress, settings.evaluations);
+    let ledger = Ledger::new(space, objective, progress, settings);
     let termination = match start.map_or(Ok(()), |gains| ledger.evaluate_start(gains)) {
         Err(ledger::BudgetSpent) => Termination::BudgetSpent,
         Ok(()) => match settings.method {

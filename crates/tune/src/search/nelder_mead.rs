@@ -46,7 +46,7 @@ pub(super) fn run(
             return Ok(Termination::BudgetSpent);
         }
         let solver = NelderMead::new(corners).with_sd_tolerance(score_of_ratio(SPREAD)).map_err(|_| failed())?;
-        let problem = Problem { ledger, before_batch: &|| () };
+        let problem = Problem(|points: &[&Vec<f64>]| ledger.scores(points));
         let ended = Executor::new(problem, solver)
             .configure(|state: IterState<Vec<f64>, (), (), (), (), f64>| state.max_iters(iterations))
             .timer(false)

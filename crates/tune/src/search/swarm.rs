@@ -1,16 +1,48 @@
 //! Particle swarm. Source: Zambrano-Bigiarini and others, *Standard Particle Swarm Optimisation 2011 at CEC-2013* (2013), as in argmin.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use argmin::core::{Executor, PopulationState};
 use argmin::solver::particleswarm::{Particle, ParticleSwarm};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
-use super::ledger::{Ledger, Problem, is_budget_spent};
+use super::ledger::{BudgetSpent, Ledger, Problem, is_budget_spent};
 use super::{Phase, SearchError, SearchSettings, Termination};
+use crate::outcome::Outcome;
 use crate::space::Method;
 use crate::streams;
+
+/// What a swarm remembers from one generation to the next.
+///
+/// A particle is compared with its own best and with the best of all, which is one of those: what is worse than the particle's own best need not be known better.
+#[derive(Default)]
+struct Flight {
+    generation: usize,
+    /// The best outcome of each particle, in argmin's order.
+    best: Vec<Outcome>,
+}
+
+impl Flight {
+    fn generation(&mut self, ledger: &Ledger<'_>, points: &[&Vec<f64>]) -> Result<Vec<f64>, BudgetSpent> {
+        ledger.enter(Phase::Swarm { generation: self.generation });
+        self.generation += 1;
+        let enough = |particle: usize| match self.best.get(particle)? {
+            Outcome::Certified { cost } | Outcome::Simulated { cost } => Some(*cost),
+            _ => None,
+        };
+        let found = ledger.outcomes(points, enough)?;
+        if self.best.is_empty() {
+            self.best.clone_from(&found);
+            // argmin sorts the particles by their first scores, once.
+            self.best.sort_by(|a, b| a.score().total_cmp(&b.score()));
+        }
+        for (best, outcome) in self.best.iter_mut().zip(&found).filter(|_| self.generation > 1) {
+            *best = (*best).min(*outcome);
+        }
+        Ok(found.into_iter().map(Outcome::score).collect())
+    }
+}
 
 pub(super) fn run(ledger: &Ledger<'_>, settings: &SearchSettings) -> Result<Termination, SearchError> {
     let dimension = ledger.space().dimension();
@@ -18,9 +50,10 @@ pub(super) fn run(ledger: &Ledger<'_>, settings: &SearchSettings) -> Result<Term
     chance.set_stream(streams::SWARM);
     let box_ = (vec![0.0; dimension], vec![1.0; dimension]);
     let solver = ParticleSwarm::new(box_, settings.particles).with_rng_generator(chance);
-    let generation = AtomicUsize::new(0);
-    let count = || ledger.enter(Phase::Swarm { generation: generation.fetch_add(1, Ordering::Relaxed) });
-    let problem = Problem { ledger, before_batch: &count };
+    let flight = Mutex::new(Flight::default());
+    let problem = Problem(|points: &[&Vec<f64>]| {
+        flight.lock().unwrap_or_else(PoisonError::into_inner).generation(ledger, points)
+    });
     // A generation that meets a new candidate spends at least one evaluation, so more generations than evaluations only repeat.
     let generations = settings.evaluations as u64 + 1;
     let ended = Executor::new(problem, solver)
