@@ -159,8 +159,8 @@ impl<const N: usize> Batch<N> {
             };
             found.into_iter().map(|metrics| score::of_run(&metrics, &self.start_rad, step_s)).collect::<Vec<_>>()
         };
-        // The worse half decides the cost, so no thread begins with the other before this one is done.
-        let half = self.plants.len().div_ceil(2).next_multiple_of(lanes);
+        // The worse half decides the cost, so nobody begins with the other before this one is done; but no thread idles.
+        let half = self.plants.len().div_ceil(2).next_multiple_of(lanes * rayon::current_num_threads());
         let mut outcomes: Vec<Outcome> = Vec::with_capacity(self.plants.len());
         for (index, plants) in self.plants.chunks(half).enumerate() {
             let bundles = plants.par_chunks(lanes).enumerate();

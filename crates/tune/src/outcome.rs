@@ -59,6 +59,14 @@ impl Finite {
     }
 }
 
+impl Finite {
+    /// The number with that key.
+    fn from_key(key: u64) -> Option<Self> {
+        let bits = if key >> 63 == 1 { key & !(1 << 63) } else { !key };
+        Self::new(f64::from_bits(bits)).ok()
+    }
+}
+
 impl TryFrom<f64> for Finite {
     type Error = NotFinite;
     fn try_from(value: f64) -> Result<Self, NotFinite> {
@@ -156,6 +164,16 @@ impl Outcome {
         f64::from(self.rank()) + self.key() as f64 * KEY_UNIT
     }
 
+    /// The cost above which a simulated candidate scores at least `score`, to the resolution of scores; none when `score` is that of no simulated candidate.
+    pub(crate) fn cost_at_score(score: f64) -> Option<Finite> {
+        if !(1.0..2.0).contains(&score) {
+            return None;
+        }
+        // Exact: a score below 2 has bits down to 2^-52.
+        let key = ((score - 1.0) / KEY_UNIT) as u64;
+        Finite::from_key(key)
+    }
+
     /// The cost, for an outcome that has one.
     pub const fn cost(self) -> Option<f64> {
         match self {
@@ -233,6 +251,15 @@ mod tests {
             if a.rank() < b.rank() {
                 prop_assert!(a.score() < b.score());
             }
+        }
+
+        #[test]
+        fn what_costs_more_than_the_cost_at_a_score_scores_no_less(a in number(), b in number()) {
+            let [first, second] = [a, b].map(|cost| Outcome::Simulated { cost }.score());
+            let at = Outcome::cost_at_score(first).unwrap();
+            prop_assert!(second >= first || b <= at);
+            let stopped = Outcome::Stopped { cost_above: at };
+            prop_assert!(stopped.score() >= first);
         }
 
         #[test]

@@ -12,7 +12,7 @@ use crate::search::{Evaluation, SearchSettings, Termination};
 use crate::space::{Freedom, ObjectiveName, Space};
 
 /// The version of the record that this crate writes.
-pub const RECORD_SCHEMA: u32 = 2;
+pub const RECORD_SCHEMA: u32 = 3;
 
 /// What was asked, in names and numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

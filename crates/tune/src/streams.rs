@@ -11,3 +11,5 @@ pub const FIRST_FILTER_PLANT: u64 = 1 << 33;
 pub const FILTER_CONFIGURATIONS: u64 = 1 << 62;
 /// The particle swarm.
 pub const SWARM: u64 = (1 << 62) + 1;
+/// CMA-ES.
+pub const CMA_ES: u64 = (1 << 62) + 2;

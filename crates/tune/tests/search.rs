@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use certune_tune::{
-    Evaluation, Finite, Freedom, Gain, Gains, Method, Outcome, Phase, Progress, Range, Scale, SearchError,
+    Evaluation, Finite, Freedom, Gain, Gains, Method, Objective, Outcome, Phase, Progress, Range, Scale, SearchError,
     SearchSettings, Space, SpaceError, Termination, search,
 };
 use proptest::prelude::*;
@@ -15,6 +15,8 @@ fn space(free: usize) -> Space {
     let freedoms = Gain::ALL.map(|gain| if order[..free].contains(&gain) { range } else { Freedom::Fixed(1.0) });
     Space::new(Method::NelderMead, None, freedoms).expect("a valid space")
 }
+
+const METHODS: [Method; 4] = [Method::Schedule, Method::CmaEs, Method::NelderMead, Method::ParticleSwarm];
 
 fn ones() -> Gains {
     Gains {
@@ -99,6 +101,38 @@ fn a_cold_swarm_finds_both() {
     }
 }
 
+/// A second basin, deeper than the one at the start and far from it.
+fn two_basins(gains: &Gains) -> Outcome {
+    let distance =
+        |at: f64| [Gain::KappaMu, Gain::KappaA, Gain::SigmaDq].map(|gain| (gains.get(gain) / at).ln().powi(2));
+    let [here, there] = [1.3, 30.0].map(|at| distance(at).iter().sum::<f64>());
+    simulated((1.0 + here).min(0.5 + there))
+}
+
+#[test]
+fn the_schedule_leaves_the_basin_of_its_start_for_a_better_one() {
+    let cost = |method, seed| {
+        let settings = SearchSettings::new(method, 800, seed);
+        cost_s(search(&space(3), Some(&ones()), &settings, &two_basins, &()).unwrap().ranked()[0])
+    };
+    assert!((cost(Method::NelderMead, 0) - 1.0).abs() < 1e-3);
+    let found: Vec<f64> = (0..10).map(|seed| cost(Method::Schedule, seed)).collect();
+    // Nobody can promise the deeper basin; a restart meets it more often than not.
+    assert!(found.iter().filter(|cost| (**cost - 0.5).abs() < 1e-3).count() >= 8, "{found:?}");
+}
+
+/// An objective that takes every chance to stop.
+struct Hasty(fn(&Gains) -> Outcome);
+
+impl Objective for Hasty {
+    fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
+        match (self.0(gains), enough) {
+            (Outcome::Simulated { cost }, Some(enough)) if cost > enough => Outcome::Stopped { cost_above: enough },
+            (outcome, _) => outcome,
+        }
+    }
+}
+
 #[test]
 fn a_swarm_does_not_see_the_start_and_depends_on_its_seed() {
     let settings = SearchSettings::new(Method::ParticleSwarm, 40, 1);
@@ -115,7 +149,7 @@ fn a_search_that_knows_everything_ends_before_its_budget() {
     let flat = |_: &Gains| simulated(1.0);
     let run = search(&space(1), Some(&ones()), &SearchSettings::new(Method::NelderMead, 1000, 0), &flat, &()).unwrap();
     assert_eq!(run.termination, Termination::Converged);
-    assert!(run.evaluations.len() < 10);
+    assert!(run.evaluations.len() < 100);
 }
 
 #[test]
@@ -128,7 +162,7 @@ fn progress_hears_every_evaluation_in_order() {
             assert!(evaluations == 35 && best.outcome <= evaluation.outcome);
         }
     }
-    for method in [Method::NelderMead, Method::ParticleSwarm] {
+    for method in METHODS {
         let counter = Counter(AtomicUsize::new(0));
         search(&space(3), Some(&ones()), &SearchSettings::new(method, 35, 0), &bowl, &counter).unwrap();
         assert_eq!(counter.0.into_inner(), 35);
@@ -148,7 +182,7 @@ fn settings_out_of_range_are_refused() {
 }
 
 fn method() -> impl Strategy<Value = Method> {
-    prop_oneof![Just(Method::NelderMead), Just(Method::ParticleSwarm)]
+    proptest::sample::select(METHODS.to_vec())
 }
 
 proptest! {
@@ -170,6 +204,26 @@ proptest! {
             Termination::Converged => prop_assert!(calls < budget),
         }
         prop_assert!(run.evaluations.iter().enumerate().all(|(index, evaluation)| evaluation.index == index));
+    }
+
+    #[test]
+    fn stopping_early_changes_no_candidate(method in method(), seed: u64, which in 0..3_usize) {
+        let objective = Hasty([bowl, cliff, two_basins][which]);
+        let run = |stop_early| {
+            let settings = SearchSettings { stop_early, ..SearchSettings::new(method, 120, seed) };
+            search(&space(3), Some(&ones()), &settings, &objective, &()).unwrap()
+        };
+        let (with, without) = (run(true), run(false));
+        prop_assert_eq!(with.termination, without.termination);
+        prop_assert_eq!(with.evaluations.len(), without.evaluations.len());
+        for (with, without) in with.evaluations.iter().zip(&without.evaluations) {
+            prop_assert_eq!(with.gains, without.gains);
+            match with.outcome {
+                Outcome::Stopped { cost_above } => prop_assert!(without.outcome.cost().is_some_and(|cost| cost > cost_above.get())),
+                outcome => prop_assert_eq!(outcome, without.outcome),
+            }
+        }
+        prop_assert_eq!(with.ranked()[0], without.ranked()[0]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 /// Crate, the crates of ours it may import, and outside crates it must never import.
-const IMPORTS: [(&str, &[&str], &[&str]); 13] = [
+const IMPORTS: [(&str, &[&str], &[&str]); 14] = [
     ("linsys", &[], &["clarabel", "argmin", "rand"]),
     ("simd", &["linsys"], &["clarabel", "argmin", "rand", "rand_chacha"]),
     ("dynamics", &["linsys"], &["clarabel", "argmin", "rand", "rand_chacha"]),
@@ -13,7 +13,12 @@ const IMPORTS: [(&str, &[&str], &[&str]); 13] = [
     ("verify", &[], &["clarabel", "argmin", "nalgebra", "rand", "faer"]),
     ("bounds", &["linsys", "dynamics", "verify"], &["clarabel", "argmin", "rand", "rand_chacha"]),
     ("certify", &["linsys", "verify", "lapack"], &["argmin", "rand"]),
-    ("tune", &["linsys", "simd", "dynamics", "control", "closed-loop", "certify"], &["minijinja", "plotters", "clap"]),
+    ("search", &[], &["argmin", "clarabel"]),
+    (
+        "tune",
+        &["linsys", "simd", "search", "dynamics", "control", "closed-loop", "certify"],
+        &["minijinja", "plotters", "clap"],
+    ),
     ("report", &[], &["nalgebra", "clarabel", "argmin"]),
     ("lapack", &[], &["clarabel", "nalgebra"]),
     ("testkit", &["linsys", "dynamics", "control"], &["clarabel", "argmin"]),

@@ -192,7 +192,9 @@ fn search(record: &RunRecord) -> SearchRecord {
         };
         let phase = match evaluation.phase {
             Phase::Start => "start",
-            Phase::Simplex { .. } => "nelder-mead",
+            Phase::Simplex => "nelder-mead",
+            Phase::CmaEs { .. } => "cma-es",
+            Phase::Polish => "polish",
             Phase::Swarm { .. } => "particle-swarm",
         };
         let outcome = match evaluation.outcome {

@@ -73,6 +73,11 @@ impl<'a> Ledger<'a> {
         self.budget - self.len()
     }
 
+    /// Index of the best evaluation.
+    pub(super) fn best_index(&self) -> usize {
+        self.book().best
+    }
+
     pub(super) fn best(&self) -> Option<Gains> {
         let book = self.book();
         book.evaluations.get(book.best).map(|evaluation| evaluation.gains)
@@ -85,11 +90,6 @@ impl<'a> Ledger<'a> {
     /// Evaluates the start exactly as it was given, unrounded.
     pub(super) fn evaluate_start(&self, start: Gains) -> Result<(), BudgetSpent> {
         self.evaluate(&[start], |_| None).map(|_| ())
-    }
-
-    /// The exact scores at `points`.
-    pub(super) fn scores(&self, points: &[&Vec<f64>]) -> Result<Vec<f64>, BudgetSpent> {
-        Ok(self.outcomes(points, |_| None)?.into_iter().map(Outcome::score).collect())
     }
 
     /// The outcomes at `points`, evaluated in parallel and recorded in order. A point whose gains are known costs nothing.

@@ -1,25 +1,32 @@
 //! Derivative-free search with an exact budget of evaluations, driven by argmin.
 //!
-//! - Nelder-Mead ([`Method::NelderMead`]) starts at given gains (the middle of the space without any) with one corner of the simplex per coordinate,
-//!   and starts again around the best point, with steps of the other sign, whenever the corners agree to within [`SPREAD`].
-//! - Particle swarm ([`Method::ParticleSwarm`]) starts from random points of the whole space. Given gains are evaluated first, so that the record can
-//!   compare, but the swarm does not see them.
+//! | method | what it does |
+//! |--------|--------------|
+//! | [`Method::Schedule`] | Nelder-Mead from the start, CMA-ES with restarts over the whole space, Nelder-Mead around the best |
+//! | [`Method::CmaEs`] | CMA-ES with restarts from the start, or from the middle of the space |
+//! | [`Method::NelderMead`] | Nelder-Mead from the start, or from the middle, set up anew as often as that finds something better |
+//! | [`Method::ParticleSwarm`] | particle swarm from random points. A start is evaluated first, so that the record can compare, but the swarm does not see it |
 //!
-//! **Budget.** At most `evaluations` calls reach the objective; argmin counts iterations, so the count is kept by the cost function that argmin sees, and the call
-//! after the last ends the run. A candidate met a second time (the same gains after rounding) costs nothing.
+//! **Budget.** At most `evaluations` calls reach the objective; argmin counts iterations, so the count is kept in the ledger, and the call after the last ends the run.
+//! A candidate met a second time (the same gains after rounding) costs nothing.
 //!
-//! **Reproducibility.** Nelder-Mead asks for one candidate at a time; a swarm's generation is evaluated in parallel and recorded in the order of
-//! its particles. All chance comes from ChaCha8 seeded with `seed`. The record therefore does not depend on the number of threads if the objective does not.
+//! **Stopping early.** A search says above which cost it treats all candidates alike, and the objective stops there. For Nelder-Mead that is the worst corner or the
+//! reflected point, for a swarm each particle's own best; CMA-ES learns from the bad ones too. The candidates and the winner are the same without.
 //!
-//! Limits: Nelder-Mead has no proof of convergence; the record says how it ended, not that it found the best gains.
+//! **Reproducibility.** A generation is evaluated in parallel and recorded in the order in which it was asked for. All chance comes from ChaCha8 seeded with `seed`. The
+//! record therefore does not depend on the number of threads if the objective does not.
+//!
+//! Limits: none of these has a proof of convergence; the record says how a search ended, not that it found the best gains.
 
+mod asked;
 mod ledger;
-mod nelder_mead;
+mod schedule;
+mod simplex;
 mod swarm;
 
 use serde::{Deserialize, Serialize};
 
-pub use nelder_mead::SPREAD;
+pub use simplex::SPREAD;
 
 use crate::gains::Gains;
 use crate::outcome::{Finite, Outcome};
@@ -57,11 +64,15 @@ impl Progress for () {
 pub enum Phase {
     /// The gains that the search was given.
     Start,
-    /// Nelder-Mead.
-    Simplex {
-        /// 0 for the first simplex, then the number of the restart.
-        restart: usize,
+    /// Nelder-Mead from the start.
+    Simplex,
+    /// CMA-ES.
+    CmaEs {
+        /// 0 for the first run, then the number of the restart.
+        restart: u32,
     },
+    /// Nelder-Mead around the best of a search before it.
+    Polish,
     /// Particle swarm.
     Swarm {
         /// 0 for the random start.
@@ -101,7 +112,7 @@ pub struct SearchSettings {
     pub method: Method,
     /// How many candidates may be evaluated, at least 1.
     pub evaluations: usize,
-    /// The seed of the swarm; Nelder-Mead draws nothing.
+    /// The seed of CMA-ES and the swarm; Nelder-Mead draws nothing.
     pub seed: u64,
     /// Particles of the swarm, at least 2. Default 10.
     pub particles: usize,
@@ -195,10 +206,18 @@ pub fn search(
     let ledger = Ledger::new(space, objective, progress, settings);
     let termination = match start.map_or(Ok(()), |gains| ledger.evaluate_start(gains)) {
         Err(ledger::BudgetSpent) => Termination::BudgetSpent,
-        Ok(()) => match settings.method {
-            Method::NelderMead => nelder_mead::run(&ledger, start.as_ref(), settings)?,
-            Method::ParticleSwarm => swarm::run(&ledger, settings)?,
-        },
+        Ok(()) => {
+            let start = start.map(|gains| space.encode(&gains));
+            let centre = start.clone().unwrap_or_else(|| vec![0.5; space.dimension()]);
+            let ended = match settings.method {
+                Method::Schedule => schedule::schedule(&ledger, start.as_deref(), settings),
+                Method::CmaEs => schedule::cma_alone(&ledger, &centre, settings),
+                Method::NelderMead => schedule::simplex_alone(&ledger, &centre, settings),
+                Method::ParticleSwarm => swarm::run(&ledger, settings),
+            };
+            let failed = |_| SearchError::Solver { method: settings.method, evaluations: ledger.len() };
+            ended.map_err(failed)?
+        }
     };
     Ok(SearchRun { evaluations: ledger.into_evaluations(), termination })
 }

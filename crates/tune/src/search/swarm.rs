@@ -2,15 +2,14 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use argmin::core::{Executor, PopulationState};
+use argmin::core::{Error, Executor, PopulationState};
 use argmin::solver::particleswarm::{Particle, ParticleSwarm};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 
 use super::ledger::{BudgetSpent, Ledger, Problem, is_budget_spent};
-use super::{Phase, SearchError, SearchSettings, Termination};
+use super::{Phase, SearchSettings, Termination};
 use crate::outcome::Outcome;
-use crate::space::Method;
 use crate::streams;
 
 /// What a swarm remembers from one generation to the next.
@@ -44,7 +43,7 @@ impl Flight {
     }
 }
 
-pub(super) fn run(ledger: &Ledger<'_>, settings: &SearchSettings) -> Result<Termination, SearchError> {
+pub(super) fn run(ledger: &Ledger<'_>, settings: &SearchSettings) -> Result<Termination, Error> {
     let dimension = ledger.space().dimension();
     let mut chance = ChaCha8Rng::seed_from_u64(settings.seed);
     chance.set_stream(streams::SWARM);
@@ -64,6 +63,6 @@ pub(super) fn run(ledger: &Ledger<'_>, settings: &SearchSettings) -> Result<Term
         Ok(_) if ledger.left() == 0 => Ok(Termination::BudgetSpent),
         Ok(_) => Ok(Termination::Converged),
         Err(error) if is_budget_spent(&error) => Ok(Termination::BudgetSpent),
-        Err(_) => Err(SearchError::Solver { method: Method::ParticleSwarm, evaluations: ledger.len() }),
+        Err(error) => Err(error),
     }
 }

@@ -18,7 +18,7 @@
 //! controller = "aic"
 //!
 //! [search]
-//! method = "nelder-mead"              # or "particle-swarm"
+//! method = "schedule"                 # or "cma-es", "nelder-mead", "particle-swarm"
 //! start = "pezzato2020-simulation"    # optional: a preset
 //! objective = "settling-cost"         # optional: or "certified-rate", "certified-radius"
 //!
@@ -170,6 +170,10 @@ impl SpaceError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
+    /// Nelder-Mead from the start, CMA-ES over the whole space, Nelder-Mead around the best.
+    Schedule,
+    /// CMA-ES with restarts.
+    CmaEs,
     /// Nelder-Mead from the start, with restarts.
     NelderMead,
     /// A particle swarm over the whole box: a cold start.

@@ -35,7 +35,7 @@ fn edited(from: &str, to: &str) -> Result<Space, SpaceError> {
 fn the_shipped_space_has_five_degrees_of_freedom_and_holds_the_published_gains() {
     let space = shipped();
     assert_eq!(space.dimension(), 5);
-    assert_eq!(space.method(), Method::NelderMead);
+    assert_eq!(space.method(), Method::Schedule);
     assert_eq!(space.admit(&published()).unwrap(), published());
     assert_eq!(space.decode(&space.encode(&published())), published());
 }
@@ -91,7 +91,7 @@ fn bad_files_are_refused_with_the_gain_and_the_numbers() {
     assert_eq!(file(edited("schema = 1", "schema = 2").unwrap_err()), Problem::Schema { found: 2, expected: 1 });
     assert!(matches!(edited("\"aic\"", "\"mrac\""), Err(SpaceError::MracNotTunable)));
     assert!(matches!(file(edited("\"aic\"", "\"pid\"").unwrap_err()), Problem::UnknownName { .. }));
-    assert!(matches!(file(edited("method = \"nelder-mead\"", "").unwrap_err()), Problem::MissingKey));
+    assert!(matches!(file(edited("method = \"schedule\"", "").unwrap_err()), Problem::MissingKey));
     assert!(matches!(file(edited("lower = 2.0", "lower = \"two\"").unwrap_err()), Problem::WrongType { .. }));
     assert!(matches!(file(edited("schema = 1", "schema = 1\nschema = 1").unwrap_err()), Problem::Syntax { .. }));
     assert!(matches!(edited("sigma_q = 1.0", ""), Err(SpaceError::Missing { gain: Gain::SigmaQ })));
