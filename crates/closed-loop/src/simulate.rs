@@ -213,6 +213,8 @@ pub struct Bundle<'a, const N: usize, C: Controller<N, T>, T: Lanes> {
     state: State<N, T>,
     /// The arms in that state; loads do not change their geometry.
     posture: Posture<N, T>,
+    /// Scratch of the method of fourth order: where the sub-step began, and the weighted sum of its slopes.
+    runge_kutta: [State<N, T>; 2],
     controller_state: C::State,
     commands: [Joints<N, T>; RING],
     given: Joints<N, T>,
@@ -324,6 +326,7 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
             coulomb: lanes.iter().any(|lane| lane.plant.model.coulomb_n_m().iter().any(|friction| *friction > 0.0)),
             model: nominal.clone(),
             posture: Posture::at(&nominal, &state.q),
+            runge_kutta: [state; 2],
             nominal,
             controller_state: controller.start(&first),
             commands: [Joints::zeros(); RING],
@@ -451,8 +454,7 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
             self.change_loads();
         }
         let measurement = measure(&self.state, &mut self.lanes, self.features.noise);
-        let (controller_state, u) = self.controller.step(&self.controller_state, &measurement, &goal);
-        self.controller_state = controller_state;
+        let u = self.controller.advance(&mut self.controller_state, &measurement, &goal);
 
         self.commands[self.step as usize % RING] = u;
         let mut asked = self.delayed();
@@ -476,12 +478,14 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
         recorder.sample(&Sample { step, t_s, at, measurement, goal, u, tau: given, state });
 
         let torque = if self.features.pushes { self.pushed(&given) } else { given };
-        let (posture, model, coulomb) = (&mut self.posture, &self.model, self.coulomb);
-        let next = if T::LANES == 1 {
-            integrate_single(posture, model, coulomb, self.state, &torque, &self.integrator, self.step_s)
+        let mut next = self.state;
+        let plant = (&self.model, self.coulomb);
+        let (posture, scratch) = (&mut self.posture, &mut self.runge_kutta);
+        if T::LANES == 1 {
+            integrate_single(posture, scratch, plant, &mut next, &torque, &self.integrator, self.step_s);
         } else {
-            integrate(posture, model, coulomb, self.state, &torque, &self.integrator, self.step_s)
-        };
+            integrate(posture, scratch, plant, &mut next, &torque, &self.integrator, self.step_s);
+        }
         self.step += 1;
         // 0 where every joint is in its place.
         let (zero, one) = (T::zero(), T::one());
@@ -498,7 +502,11 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
         }
         self.state = next;
         let before = (step > 0).then_some(&self.given);
-        self.meter.add(&Contribution { q: next.q, dq: next.dq, asked, given }, before, &self.motor_limit);
+        self.meter.add(
+            &Contribution { q: &next.q, dq: &next.dq, asked: &asked, given: &given },
+            before,
+            &self.motor_limit,
+        );
         self.given = given;
         if self.step == self.next_goal {
             self.next_goals();
@@ -640,26 +648,25 @@ fn gaussian(rng: &mut ChaCha8Rng) -> f64 {
     radius * (2.0 * std::f64::consts::PI * unit()).cos()
 }
 
-/// The state one sample later, `torque` held. The posture is the state's, before and after.
+/// Takes the state one sample further, `torque` held. The posture is the state's, before and after. `plant`: the model, and whether a lane has Coulomb friction.
 ///
 /// One place calls the arm's dynamics, so that each instruction set holds them once.
 #[inline(always)]
 fn integrate<const N: usize, T: Lanes>(
     posture: &mut Posture<N, T>,
-    model: &Model<N, T>,
-    coulomb: bool,
-    state: State<N, T>,
+    [start, sum]: &mut [State<N, T>; 2],
+    (model, coulomb): (&Model<N, T>, bool),
+    at: &mut State<N, T>,
     torque: &Joints<N, T>,
     integrator: &Integrator,
     step_s: f64,
-) -> State<N, T> {
+) {
     let h = T::from_f64(step_s / f64::from(integrator.substeps));
     let stages = match integrator.method {
         Method::SemiImplicitEuler => 1,
         Method::RungeKutta4 => RUNGE_KUTTA.len(),
     };
     let mut armature = *model.rotor_inertia_kg_m2();
-    let (mut at, mut start, mut sum) = (state, state, state);
     for _ in 0..integrator.substeps {
         for stage in 0..stages {
             if coulomb && stages == 1 {
@@ -676,7 +683,7 @@ fn integrate<const N: usize, T: Lanes>(
                 }
             } else {
                 if stage == 0 {
-                    (start, sum) = (at, State::at_rest(Joints::zeros()));
+                    (*start, *sum) = (*at, State::at_rest(Joints::zeros()));
                 }
                 let (weight, ahead) = RUNGE_KUTTA[stage];
                 let (weight, ahead) = (T::from_f64(weight), h * T::from_f64(ahead));
@@ -695,7 +702,6 @@ fn integrate<const N: usize, T: Lanes>(
             posture.move_to(model, &at.q);
         }
     }
-    at
 }
 
 /// Weight of each stage of the classical method of order 4, and how far ahead of the start the next stage looks, in steps.
@@ -705,14 +711,14 @@ const RUNGE_KUTTA: [(f64, f64); 4] = [(1.0 / 6.0, 0.5), (1.0 / 3.0, 0.5), (1.0 /
 #[inline(never)]
 fn integrate_single<const N: usize, T: Lanes>(
     posture: &mut Posture<N, T>,
-    model: &Model<N, T>,
-    coulomb: bool,
-    state: State<N, T>,
+    scratch: &mut [State<N, T>; 2],
+    plant: (&Model<N, T>, bool),
+    at: &mut State<N, T>,
     torque: &Joints<N, T>,
     integrator: &Integrator,
     step_s: f64,
-) -> State<N, T> {
-    integrate(posture, model, coulomb, state, torque, integrator, step_s)
+) {
+    integrate(posture, scratch, plant, at, torque, integrator, step_s);
 }
 
 /// The gravity torque for one arm, as [`integrate_single`].

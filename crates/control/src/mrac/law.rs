@@ -331,7 +331,6 @@ impl<const N: usize, T: Real> Controller<N, T> for Mrac<N, T> {
         MracState { q_ref: at.q, dq_ref: Joints::zeros(), integral: Products::zeros(), last: None }
     }
 
-    /// The torque of [`AdaptiveGains`], without forming them: of each outer product only what it does to its own signal is needed.
     #[inline(always)]
     fn step(
         &self,
@@ -339,17 +338,29 @@ impl<const N: usize, T: Real> Controller<N, T> for Mrac<N, T> {
         measurement: &Measurement<N, T>,
         goal: &Joints<N, T>,
     ) -> (MracState<N, T>, Joints<N, T>) {
-        let seen = self.signals(state, measurement, goal);
         let mut next = *state;
-        let mut torque = self.integral_terms(&mut next.integral, &seen);
+        let u = self.advance(&mut next, measurement, goal);
+        (next, u)
+    }
+
+    /// The torque of [`AdaptiveGains`], without forming them: of each outer product only what it does to its own signal is needed.
+    #[inline(always)]
+    fn advance(
+        &self,
+        state: &mut MracState<N, T>,
+        measurement: &Measurement<N, T>,
+        goal: &Joints<N, T>,
+    ) -> Joints<N, T> {
+        let seen = self.signals(state, measurement, goal);
+        let mut torque = self.integral_terms(&mut state.integral, &seen);
         self.proportional_terms(&seen, &mut torque);
         if let (true, Some(last)) = (self.derivatives, &state.last) {
             self.derivative_terms(&seen, last, &mut torque);
         }
-        next.last = Some(seen);
+        state.last = Some(seen);
         if self.law == MracLaw::ReferenceModel {
-            self.advance_reference(&mut next, goal);
+            self.advance_reference(state, goal);
         }
-        (next, Joints::from(torque))
+        Joints::from(torque)
     }
 }
