@@ -232,6 +232,7 @@ fn table(programs: &Programs) -> Outcome {
                 seen.push(programs.theirs_ns(peer, their_work)?);
             }
         }
+        ours.entry("mrac").or_default().push(programs.ours_ns("mrac")?);
     }
     let peak = median((0..ROUNDS).map(|_| programs.ours(&["peak"])).collect::<Result<_, _>>()?);
     let of_peak = |work: &str, ns: f64| Ok::<_, String>(100.0 * programs.ours(&["operations", work])? / (ns * peak));
@@ -246,19 +247,20 @@ fn table(programs: &Programs) -> Outcome {
         let (mine, other) = (median(ours[work].clone()), median(theirs[&(peer, their_work)].clone()));
         print(title, mine, of_peak(work, mine)?, other, peer.name(), aim);
     }
-    let mrac = median((0..ROUNDS).map(|_| programs.ours_ns("mrac")).collect::<Result<_, _>>()?);
-    print("MRAC step over AIC step", mrac, of_peak("mrac", mrac)?, median(ours["aic"].clone()), "our AIC", MRAC_AIM);
+    let (mrac, aic) = (median(ours["mrac"].clone()), median(ours["aic"].clone()));
+    print("MRAC step over AIC step", mrac, of_peak("mrac", mrac)?, aic, "our AIC", MRAC_AIM);
     Ok(())
 }
 
 /// The closed loop of chains against the number of joints, and how far it is from a straight line.
 fn lines(programs: &Programs) -> Outcome {
-    let mut points = Vec::new();
-    for joints in CHAINS {
-        let work = format!("chain-{joints}");
-        let ns = median((0..ROUNDS).map(|_| programs.ours_ns(&work)).collect::<Result<_, _>>()?);
-        points.push((joints as f64, ns));
+    let mut seen = CHAINS.map(|joints| (joints, Vec::new()));
+    for _ in 0..ROUNDS {
+        for (joints, ns) in &mut seen {
+            ns.push(programs.ours_ns(&format!("chain-{joints}"))?);
+        }
     }
+    let points = seen.map(|(joints, ns)| (joints as f64, median(ns)));
     let count = points.len() as f64;
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
     let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
