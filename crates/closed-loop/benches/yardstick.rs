@@ -3,6 +3,8 @@
 //! | call | prints |
 //! |------|--------|
 //! | `yardstick WORK` | `WORK NS_PER_ITEM` |
+//! | `yardstick operations WORK` | `WORK OPERATIONS_PER_ITEM`, see [`certune_testkit::operations`] |
+//! | `yardstick peak` | `peak OPERATIONS_PER_NS` of one core |
 //! | `yardstick model` | the arm for Pinocchio's program |
 //! | `yardstick mjcf` | the arm for MuJoCo |
 //! | `yardstick check` | accelerations in one state, for comparison with Pinocchio's |
@@ -14,14 +16,17 @@
 use std::hint::black_box;
 use std::path::Path;
 
-use certune_closed_loop::{Gains, GainsFile, NoiseStream, Plant, PlantSetting, Run, Scenario, Task, simulate_many_on};
+use certune_closed_loop::{
+    Bundle, Gains, GainsFile, NoiseStream, Plant, PlantSetting, Run, Scenario, Task, simulate_many_on,
+};
 use certune_control::aic::{Aic, AicParams};
 use certune_control::mrac::{Mrac, MracParams};
 use certune_control::{Controller, Measurement};
 use certune_dynamics::{
     Joints, Model, Robot, State, forward_dynamics, gravity_torque, inverse_dynamics, linearise, mass_matrix,
 };
-use certune_simd::InstructionSet;
+use certune_simd::{InstructionSet, Kernel, Lanes};
+use certune_testkit::{Counted, operations};
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
 use rand_chacha::ChaCha8Rng;
@@ -138,7 +143,7 @@ fn closed_loop_ns(set: InstructionSet, seconds: f64) -> f64 {
 }
 
 /// The closed loop on a random chain of `N` joints.
-fn chain_ns<const N: usize>(seconds: f64) -> f64 {
+fn chain_ns<const N: usize>(coulomb: bool, seconds: f64) -> f64 {
     let mut runner = TestRunner::deterministic();
     let robot = certune_testkit::serial_arm::<N>().new_tree(&mut runner).unwrap().current();
     let task = Task {
@@ -152,8 +157,9 @@ fn chain_ns<const N: usize>(seconds: f64) -> f64 {
         payloads: Vec::new(),
         pushes: Vec::new(),
     };
-    // Heavy friction: any chain stays where it is, and the work is the same.
-    let setting = PlantSetting::nominal(&robot, false).with_friction(50.0).with_rotor_inertia(1.0);
+    // Heavy viscous friction: any chain stays where it is. Without Coulomb friction, which only some of the random joints have, the work of a joint is the same in all.
+    let mut setting = PlantSetting::nominal(&robot, false).with_friction(50.0).with_rotor_inertia(1.0);
+    setting.coulomb_n_m.fill(if coulomb { 0.5 } else { 0.0 });
     let plant = Plant::<N>::new(&robot, &setting).unwrap();
     let params = published::<N>();
     let set = InstructionSet::widest();
@@ -181,12 +187,16 @@ fn step_ns<C: Controller<7>>(controller: &C, seconds: f64, torque: impl Fn(&C::S
     })
 }
 
-fn mrac_ns(seconds: f64) -> f64 {
+fn mrac_params() -> MracParams<7> {
     let text = include_str!("../../../tuning/presets/pezzato2020-mrac-simulation.toml");
     let Gains::Mrac(gains) = GainsFile::parse(Path::new("preset"), text).unwrap().gains else {
         unreachable!("an MRAC preset")
     };
-    let mrac = Mrac::<7>::new(&MracParams::new(&gains.bind().unwrap(), 1e-3).unwrap());
+    MracParams::new(&gains.bind().unwrap(), 1e-3).unwrap()
+}
+
+fn mrac_ns(seconds: f64) -> f64 {
+    let mrac = Mrac::<7>::new(&mrac_params());
     let mut measured = Measurement { q: Joints::zeros(), dq: Joints::zeros() };
     let goal = Joints::repeat(0.3);
     let mut state = mrac.start(&measured);
@@ -215,11 +225,93 @@ fn measure(work: &str, seconds: f64) -> Option<f64> {
         "linearise" => time_ns(seconds, |k| linearise(&arm, &states[k].at, &states[k].tau).ddq_dq[(0, 0)]),
         "aic" => step_ns(&Aic::<7>::new(&published()), seconds, |state| state.u[0]),
         "mrac" => mrac_ns(seconds),
-        "chain-2" => chain_ns::<2>(seconds),
-        "chain-4" => chain_ns::<4>(seconds),
-        "chain-7" => chain_ns::<7>(seconds),
-        "chain-14" => chain_ns::<14>(seconds),
-        "chain-28" => chain_ns::<28>(seconds),
+        "chain-2" => chain_ns::<2>(false, seconds),
+        "chain-4" => chain_ns::<4>(false, seconds),
+        "chain-7" => chain_ns::<7>(false, seconds),
+        "chain-7-coulomb" => chain_ns::<7>(true, seconds),
+        "chain-14" => chain_ns::<14>(false, seconds),
+        "chain-28" => chain_ns::<28>(false, seconds),
+        _ => return None,
+    })
+}
+
+/// Twelve chains of multiply-adds, which nothing but the registers holds up.
+struct Chains(u32);
+
+impl Kernel for Chains {
+    /// Operations, and the chains' ends.
+    type Output = (f64, f64);
+    #[inline(always)]
+    fn run<T: Lanes>(self) -> (f64, f64) {
+        const CHAINS: usize = 12;
+        // Started apart, so that no two are the same; towards 1, so that none overflows.
+        let mut ends = [T::zero(); CHAINS];
+        for chain in 0..CHAINS {
+            ends[chain] = T::from_f64(black_box(1.0 + chain as f64));
+        }
+        let (factor, addend) = (T::from_f64(black_box(0.5)), T::from_f64(black_box(0.5)));
+        for _ in 0..self.0 {
+            for chain in 0..CHAINS {
+                ends[chain] = ends[chain].mul_add(factor, addend);
+            }
+        }
+        let mut sum = T::zero();
+        for chain in 0..CHAINS {
+            sum += ends[chain];
+        }
+        (2.0 * (CHAINS * T::LANES) as f64 * f64::from(self.0), sum.lane(0))
+    }
+}
+
+/// Operations per nanosecond of one core on its widest registers: the best of some tries.
+fn peak_per_ns() -> f64 {
+    let rounds = 2_000_000;
+    let once = || {
+        let start = cpu_s();
+        let (operations, end) = InstructionSet::widest().run(Chains(rounds));
+        black_box(end);
+        1e-9 * operations / (cpu_s() - start)
+    };
+    (0..10).map(|_| once()).fold(0.0, f64::max)
+}
+
+fn counted<const N: usize>(joints: &Joints<N>) -> Joints<N, Counted> {
+    joints.map(Counted)
+}
+
+/// Operations of one item of a work.
+fn operations_of(work: &str) -> Option<u64> {
+    const STEPS: u64 = 1000;
+    let robot = Robot::panda();
+    let arm = Model::<7, Counted>::pack(&[&Model::new(&robot).unwrap()], |[number]| Counted(number));
+    let sample = &samples(&robot)[0];
+    let at = State { q: counted(&sample.at.q), dq: counted(&sample.at.dq) };
+    let (ddq, tau) = (counted(&sample.ddq), counted(&sample.tau));
+    let measured = Measurement { q: at.q, dq: at.dq };
+    Some(match work {
+        "closed-loop" | "closed-loop-avx2" | "closed-loop-single" => {
+            let task = task(&robot);
+            let plant = Plant::<7>::new(&robot, &PlantSetting::nominal(&robot, false)).unwrap();
+            let controller = Aic::<7, Counted>::new(&published());
+            let run = Run { plant: &plant, task: &task, noise: NoiseStream::default() };
+            let mut bundle = Bundle::side_by_side(&[run], &controller);
+            operations(|| (0..STEPS).for_each(|_| _ = bundle.advance(&mut ()))) / STEPS
+        }
+        "aba" => operations(|| forward_dynamics(&arm, &at, &tau)),
+        "rnea" => operations(|| inverse_dynamics(&arm, &at, &ddq)),
+        "crba" => operations(|| mass_matrix(&arm, &at.q)),
+        "gravity" => operations(|| gravity_torque(&arm, &at.q)),
+        "linearise" => operations(|| linearise(&arm, &at, &tau)),
+        "aic" => {
+            let controller = Aic::<7, Counted>::new(&published());
+            let state = controller.start(&measured);
+            operations(|| controller.step(&state, &measured, &ddq))
+        }
+        "mrac" => {
+            let controller = Mrac::<7, Counted>::new(&mrac_params());
+            let state = controller.start(&measured);
+            operations(|| controller.step(&state, &measured, &ddq))
+        }
         _ => return None,
     })
 }
@@ -275,6 +367,11 @@ fn main() {
         Some("model") => println!("{}", model()),
         Some("mjcf") => println!("{}", mjcf()),
         Some("check") => println!("{}", check()),
+        Some("peak") => println!("peak {:.2}", peak_per_ns()),
+        Some("operations") => {
+            let work = std::env::args().nth(2).unwrap_or_default();
+            println!("{work} {}", operations_of(&work).map_or_else(|| "unknown".to_owned(), |count| count.to_string()));
+        }
         Some(work) => match measure(work, SECONDS) {
             Some(ns) => println!("{work} {ns:.2}"),
             None => {

@@ -54,8 +54,7 @@ pub fn gain_drift<const N: usize>(
     let mut drift = Vec::with_capacity(stays);
     for (stay, goal) in goals.iter().cycle().take(stays).enumerate() {
         for _ in 0..samples {
-            let (next, torque) = controller.step(&memory, &seen(&at), goal);
-            memory = next;
+            let torque = controller.advance(&mut memory, &seen(&at), goal);
             at.dq += forward_dynamics(&model, &at, &torque) * step_s;
             at.q += at.dq * step_s;
         }

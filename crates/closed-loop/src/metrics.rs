@@ -100,15 +100,15 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 
 /// What one sample contributes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Contribution<const N: usize, T: Real = f64> {
+pub(crate) struct Contribution<'a, const N: usize, T: Real = f64> {
     /// Position at the end of the sample, rad.
-    pub q: Joints<N, T>,
+    pub q: &'a Joints<N, T>,
     /// Velocity at the end of the sample, rad/s.
-    pub dq: Joints<N, T>,
+    pub dq: &'a Joints<N, T>,
     /// Torque asked of the motor, N m.
-    pub asked: Joints<N, T>,
+    pub asked: &'a Joints<N, T>,
     /// Torque the motor gives, N m.
-    pub given: Joints<N, T>,
+    pub given: &'a Joints<N, T>,
 }
 
 /// Accumulates one segment in every lane. `Copy`, no heap; counts are whole numbers.
@@ -195,7 +195,12 @@ impl<const N: usize, T: Lanes> Meter<N, T> {
 
     /// One sample more; `previously_given` from the run's second sample on.
     #[inline(always)]
-    pub fn add(&mut self, sample: &Contribution<N, T>, previously_given: Option<&Joints<N, T>>, limit: &Joints<N, T>) {
+    pub fn add(
+        &mut self,
+        sample: &Contribution<'_, N, T>,
+        previously_given: Option<&Joints<N, T>>,
+        limit: &Joints<N, T>,
+    ) {
         let (zero, one) = (T::zero(), T::one());
         self.samples += one;
         if previously_given.is_some() {
@@ -266,7 +271,7 @@ mod tests {
             let t = k as f64 * STEP_S;
             let q = Joints::<3>::new(2.0 - (-t / 0.5).exp(), -1.0 + (-t / 0.5).exp() * (8.0 * t).cos(), 0.5 + 0.01 * t);
             let given = Joints::<3>::new(30.0 * t, 5.0, -8.0 * t);
-            let sample = Contribution { q, dq: Joints::zeros(), asked: given, given };
+            let sample = Contribution { q: &q, dq: &Joints::zeros(), asked: &given, given: &given };
             meter.add(&sample, before.as_ref(), &Joints::<3>::new(60.0, 10.0, 1e9));
             before = Some(given);
         }

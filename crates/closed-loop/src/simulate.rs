@@ -36,9 +36,7 @@
 
 use certune_control::aic::{Aic, AicParams};
 use certune_control::{Controller, Measurement};
-use certune_dynamics::{
-    COULOMB_SPEED_RAD_PER_S, Model, Robot, State, flange_jacobian, forward_dynamics_with_armature, gravity_torque,
-};
+use certune_dynamics::{COULOMB_SPEED_RAD_PER_S, Model, Posture, Robot, State, flange_jacobian};
 use certune_linsys::{Joints, Lanes, Real};
 use certune_simd::{InstructionSet, Kernel};
 use nalgebra::Vector3;
@@ -213,6 +211,10 @@ pub struct Bundle<'a, const N: usize, C: Controller<N, T>, T: Lanes> {
     nominal: Model<N, T>,
     coulomb: bool,
     state: State<N, T>,
+    /// The arms in that state; loads do not change their geometry.
+    posture: Posture<N, T>,
+    /// Scratch of the method of fourth order: where the sub-step began, and the weighted sum of its slopes.
+    runge_kutta: [State<N, T>; 2],
     controller_state: C::State,
     commands: [Joints<N, T>; RING],
     given: Joints<N, T>,
@@ -323,6 +325,8 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
             integrator: task.integrator,
             coulomb: lanes.iter().any(|lane| lane.plant.model.coulomb_n_m().iter().any(|friction| *friction > 0.0)),
             model: nominal.clone(),
+            posture: Posture::at(&nominal, &state.q),
+            runge_kutta: [state; 2],
             nominal,
             controller_state: controller.start(&first),
             commands: [Joints::zeros(); RING],
@@ -350,6 +354,7 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
     /// Puts the arms somewhere else; for tests and what-if questions.
     pub fn set_state(&mut self, state: State<N, T>) {
         self.state = state;
+        self.posture.move_to(&self.model, &state.q);
     }
 
     /// The controller's state.
@@ -449,16 +454,15 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
             self.change_loads();
         }
         let measurement = measure(&self.state, &mut self.lanes, self.features.noise);
-        let (controller_state, u) = self.controller.step(&self.controller_state, &measurement, &goal);
-        self.controller_state = controller_state;
+        let u = self.controller.advance(&mut self.controller_state, &measurement, &goal);
 
         self.commands[self.step as usize % RING] = u;
         let mut asked = self.delayed();
         if self.features.compensation {
             let gravity = if T::LANES == 1 {
-                gravity_single(&self.nominal, &self.state.q)
+                gravity_single(&self.posture, &self.nominal)
             } else {
-                gravity_torque(&self.nominal, &self.state.q)
+                self.posture.gravity_torque(&self.nominal)
             };
             for joint in 0..N {
                 let with = asked[joint] + gravity[joint];
@@ -474,11 +478,14 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
         recorder.sample(&Sample { step, t_s, at, measurement, goal, u, tau: given, state });
 
         let torque = if self.features.pushes { self.pushed(&given) } else { given };
-        let next = if T::LANES == 1 {
-            integrate_single(&self.model, self.coulomb, self.state, &torque, &self.integrator, self.step_s)
+        let mut next = self.state;
+        let plant = (&self.model, self.coulomb);
+        let (posture, scratch) = (&mut self.posture, &mut self.runge_kutta);
+        if T::LANES == 1 {
+            integrate_single(posture, scratch, plant, &mut next, &torque, &self.integrator, self.step_s);
         } else {
-            integrate(&self.model, self.coulomb, self.state, &torque, &self.integrator, self.step_s)
-        };
+            integrate(posture, scratch, plant, &mut next, &torque, &self.integrator, self.step_s);
+        }
         self.step += 1;
         // 0 where every joint is in its place.
         let (zero, one) = (T::zero(), T::one());
@@ -495,7 +502,11 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
         }
         self.state = next;
         let before = (step > 0).then_some(&self.given);
-        self.meter.add(&Contribution { q: next.q, dq: next.dq, asked, given }, before, &self.motor_limit);
+        self.meter.add(
+            &Contribution { q: &next.q, dq: &next.dq, asked: &asked, given: &given },
+            before,
+            &self.motor_limit,
+        );
         self.given = given;
         if self.step == self.next_goal {
             self.next_goals();
@@ -686,56 +697,60 @@ fn gaussian(rng: &mut ChaCha8Rng) -> f64 {
     radius * (2.0 * std::f64::consts::PI * unit()).cos()
 }
 
-/// The state one sample later, `torque` held.
+/// Takes the state one sample further, `torque` held. The posture is the state's, before and after. `plant`: the model, and whether a lane has Coulomb friction.
 ///
 /// One place calls the arm's dynamics, so that each instruction set holds them once.
 #[inline(always)]
 fn integrate<const N: usize, T: Lanes>(
-    model: &Model<N, T>,
-    coulomb: bool,
-    mut state: State<N, T>,
+    posture: &mut Posture<N, T>,
+    [start, sum]: &mut [State<N, T>; 2],
+    (model, coulomb): (&Model<N, T>, bool),
+    at: &mut State<N, T>,
     torque: &Joints<N, T>,
     integrator: &Integrator,
     step_s: f64,
-) -> State<N, T> {
+) {
     let h = T::from_f64(step_s / f64::from(integrator.substeps));
     let stages = match integrator.method {
         Method::SemiImplicitEuler => 1,
         Method::RungeKutta4 => RUNGE_KUTTA.len(),
     };
+    let mut armature = *model.rotor_inertia_kg_m2();
     for _ in 0..integrator.substeps {
-        let start = state;
-        let (mut at, mut sum) = (state, State::<N, T>::at_rest(Joints::zeros()));
         for stage in 0..stages {
-            let mut slope = Joints::<N, T>::zeros();
             if coulomb && stages == 1 {
                 for joint in 0..N {
-                    let speed = at.dq[joint];
-                    slope[joint] = model.coulomb_n_m()[joint] * T::from_lanes(|lane| secant(speed.lane(lane))) * h;
+                    let slope = model.coulomb_n_m()[joint] * secant(at.dq[joint]) * h;
+                    armature[joint] = model.rotor_inertia_kg_m2()[joint] + slope;
                 }
             }
-            let ddq = forward_dynamics_with_armature(model, &at, torque, &slope);
+            let ddq = posture.forward_dynamics(model, &at.dq, torque, &armature);
             if stages == 1 {
                 for joint in 0..N {
-                    state.dq[joint] = ddq[joint].mul_add(h, start.dq[joint]);
-                    state.q[joint] = state.dq[joint].mul_add(h, start.q[joint]);
+                    at.dq[joint] = ddq[joint].mul_add(h, at.dq[joint]);
+                    at.q[joint] = at.dq[joint].mul_add(h, at.q[joint]);
                 }
-                continue;
+            } else {
+                if stage == 0 {
+                    (*start, *sum) = (*at, State::at_rest(Joints::zeros()));
+                }
+                let (weight, ahead) = RUNGE_KUTTA[stage];
+                let (weight, ahead) = (T::from_f64(weight), h * T::from_f64(ahead));
+                for joint in 0..N {
+                    let speed = at.dq[joint];
+                    sum.q[joint] = speed.mul_add(weight, sum.q[joint]);
+                    sum.dq[joint] = ddq[joint].mul_add(weight, sum.dq[joint]);
+                    at.q[joint] = speed.mul_add(ahead, start.q[joint]);
+                    at.dq[joint] = ddq[joint].mul_add(ahead, start.dq[joint]);
+                    if stage + 1 == stages {
+                        at.q[joint] = sum.q[joint].mul_add(h, start.q[joint]);
+                        at.dq[joint] = sum.dq[joint].mul_add(h, start.dq[joint]);
+                    }
+                }
             }
-            let (weight, ahead) = RUNGE_KUTTA[stage];
-            let (weight, ahead) = (T::from_f64(weight), h * T::from_f64(ahead));
-            for joint in 0..N {
-                sum.q[joint] = at.dq[joint].mul_add(weight, sum.q[joint]);
-                sum.dq[joint] = ddq[joint].mul_add(weight, sum.dq[joint]);
-                let speed = at.dq[joint];
-                at.q[joint] = speed.mul_add(ahead, start.q[joint]);
-                at.dq[joint] = ddq[joint].mul_add(ahead, start.dq[joint]);
-                state.q[joint] = sum.q[joint].mul_add(h, start.q[joint]);
-                state.dq[joint] = sum.dq[joint].mul_add(h, start.dq[joint]);
-            }
+            posture.move_to(model, &at.q);
         }
     }
-    state
 }
 
 /// Weight of each stage of the classical method of order 4, and how far ahead of the start the next stage looks, in steps.
@@ -744,25 +759,27 @@ const RUNGE_KUTTA: [(f64, f64); 4] = [(1.0 / 6.0, 0.5), (1.0 / 3.0, 0.5), (1.0 /
 /// [`integrate`] for one arm, compiled once for all controllers; lanes must stay in the registers of the caller.
 #[inline(never)]
 fn integrate_single<const N: usize, T: Lanes>(
-    model: &Model<N, T>,
-    coulomb: bool,
-    state: State<N, T>,
+    posture: &mut Posture<N, T>,
+    scratch: &mut [State<N, T>; 2],
+    plant: (&Model<N, T>, bool),
+    at: &mut State<N, T>,
     torque: &Joints<N, T>,
     integrator: &Integrator,
     step_s: f64,
-) -> State<N, T> {
-    integrate(model, coulomb, state, torque, integrator, step_s)
+) {
+    integrate(posture, scratch, plant, at, torque, integrator, step_s);
 }
 
-/// [`gravity_torque`] for one arm, as [`integrate_single`].
+/// The gravity torque for one arm, as [`integrate_single`].
 #[inline(never)]
-fn gravity_single<const N: usize, T: Lanes>(model: &Model<N, T>, q: &Joints<N, T>) -> Joints<N, T> {
-    gravity_torque(model, q)
+fn gravity_single<const N: usize, T: Lanes>(posture: &Posture<N, T>, model: &Model<N, T>) -> Joints<N, T> {
+    posture.gravity_torque(model)
 }
 
 /// `tanh(dq/ε)/dq`, s/rad: `1/ε` at rest.
-pub(crate) fn secant(speed: f64) -> f64 {
-    let ratio = speed / COULOMB_SPEED_RAD_PER_S;
+#[inline(always)]
+pub(crate) fn secant<T: Real>(speed: T) -> T {
+    let ratio = speed / T::from_f64(COULOMB_SPEED_RAD_PER_S);
     // Below 1e-4 the series 1 - x²/3 is 1 to four parts in 1e9, and 0/0 is avoided.
-    if ratio.abs() < 1e-4 { COULOMB_SPEED_RAD_PER_S.recip() } else { ratio.tanh() / speed }
+    ratio.abs().choose(T::from_f64(1e-4), T::from_f64(COULOMB_SPEED_RAD_PER_S.recip()), ratio.tanh() / speed)
 }

@@ -33,4 +33,12 @@ pub trait Controller<const N: usize, T: Real = f64> {
         measurement: &Measurement<N, T>,
         goal: &Joints<N, T>,
     ) -> (Self::State, Joints<N, T>);
+
+    /// [`Controller::step`] in place: `state` becomes the next one, to the bit; returns the torques. For loops that do not keep the old state.
+    #[inline(always)]
+    fn advance(&self, state: &mut Self::State, measurement: &Measurement<N, T>, goal: &Joints<N, T>) -> Joints<N, T> {
+        let (next, u) = self.step(state, measurement, goal);
+        *state = next;
+        u
+    }
 }

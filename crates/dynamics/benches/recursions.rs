@@ -3,8 +3,9 @@
 use std::hint::black_box;
 
 use certune_dynamics::{
-    Joints, Model, Robot, RobotError, State, coriolis_matrix, forward_dynamics, gravity_torque, inverse_dynamics,
-    linearise, mass_matrix,
+    Joints, Model, Posture, Robot, RobotError, State, coriolis_matrix, coriolis_torque, flange_jacobian, flange_pose,
+    forward_dynamics, friction_slope, friction_torque, gravity_jacobian, gravity_torque, inverse_dynamics,
+    inverse_dynamics_derivatives, kinetic_energy, linearise, mass_matrix, mass_matrix_derivatives, potential_energy,
 };
 use criterion::{Criterion, criterion_group, criterion_main};
 
@@ -22,6 +23,26 @@ fn recursions(criterion: &mut Criterion) -> Result<(), RobotError> {
     criterion.bench_function("gravity_torque", |b| b.iter(|| gravity_torque(&arm, black_box(&at.q))));
     criterion.bench_function("mass_matrix", |b| b.iter(|| mass_matrix(&arm, black_box(&at.q))));
     criterion.bench_function("coriolis_matrix", |b| b.iter(|| coriolis_matrix(&arm, black_box(&at))));
+    let mut posture = Posture::at(&arm, &at.q);
+    let armature = *arm.rotor_inertia_kg_m2();
+    criterion.bench_function("posture move_to", |b| b.iter(|| posture.move_to(&arm, black_box(&at.q))));
+    criterion.bench_function("posture forward_dynamics", |b| {
+        b.iter(|| posture.forward_dynamics(&arm, black_box(&at.dq), black_box(&tau), &armature))
+    });
+    criterion.bench_function("posture gravity_torque", |b| b.iter(|| black_box(&posture).gravity_torque(&arm)));
+    criterion.bench_function("coriolis_torque", |b| b.iter(|| coriolis_torque(&arm, black_box(&at))));
+    criterion.bench_function("gravity_jacobian", |b| b.iter(|| gravity_jacobian(&arm, black_box(&at.q))));
+    criterion.bench_function("mass_matrix_derivatives", |b| b.iter(|| mass_matrix_derivatives(&arm, black_box(&at.q))));
+    criterion.bench_function("inverse_dynamics_derivatives", |b| {
+        b.iter(|| inverse_dynamics_derivatives(&arm, black_box(&at), black_box(&tau)))
+    });
+    criterion.bench_function("flange_pose", |b| b.iter(|| flange_pose(&arm, black_box(&at.q))));
+    criterion.bench_function("flange_jacobian", |b| b.iter(|| flange_jacobian(&arm, black_box(&at.q))));
+    criterion.bench_function("kinetic_energy", |b| b.iter(|| kinetic_energy(&arm, black_box(&at))));
+    criterion.bench_function("potential_energy", |b| b.iter(|| potential_energy(&arm, black_box(&at.q))));
+    let rough = arm.with_friction(&Joints::repeat(1.0), &Joints::repeat(0.5));
+    criterion.bench_function("friction_torque", |b| b.iter(|| friction_torque(&rough, black_box(&at.dq))));
+    criterion.bench_function("friction_slope", |b| b.iter(|| friction_slope(&rough, black_box(&at.dq))));
     criterion.bench_function("linearise", |b| b.iter(|| linearise(&arm, black_box(&at), black_box(&tau))));
     Ok(())
 }

@@ -36,8 +36,20 @@ impl<T: Real> Hinge<T> {
     /// The way to the parent at the joint's angle, rad.
     #[inline(always)]
     pub(crate) fn passage(&self, q: T) -> Passage<T> {
+        self.turned(self.turn(q))
+    }
+
+    /// The turn about the joint's axis at its angle, rad.
+    #[inline(always)]
+    pub(crate) fn turn(&self, q: T) -> Turn<T> {
         let (sin, cos) = (q + self.offset).sin_cos();
-        Passage { tilt: Turn { sin: self.tilt[0], cos: self.tilt[1] }, turn: Turn { sin, cos } }
+        Turn { sin, cos }
+    }
+
+    /// The way to the parent when the joint is turned like this.
+    #[inline(always)]
+    pub(crate) fn turned(&self, turn: Turn<T>) -> Passage<T> {
+        Passage { tilt: Turn { sin: self.tilt[0], cos: self.tilt[1] }, turn }
     }
 }
 

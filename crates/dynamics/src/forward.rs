@@ -22,9 +22,10 @@
 
 use certune_linsys::{Joints, Real};
 
-use crate::friction::friction_torque;
+use crate::friction::joint_friction;
 use crate::local::{Body, M3, Passage, V3, apply, less_outer, sum};
 use crate::model::{Model, State};
+use crate::posture::Posture;
 use crate::spatial::Sym3;
 
 /// Joint accelerations under `tau`: `M(q)^-1 (tau - C(q, dq) dq - g(q) - friction(dq))`, rotor inertia included in M.
@@ -36,7 +37,8 @@ pub fn forward_dynamics<const N: usize, T: Real>(
     at: &State<N, T>,
     tau: &Joints<N, T>,
 ) -> Joints<N, T> {
-    articulated_body(model, at, tau, &model.rotor_inertia)
+    let mut posture = Posture::at(model, &at.q);
+    posture.forward_dynamics(model, &at.dq, tau, &model.rotor_inertia)
 }
 
 /// [`forward_dynamics`] with `M + diag(extra)` in place of M; `extra` in kg m^2, at least 0.
@@ -53,7 +55,8 @@ pub fn forward_dynamics_with_armature<const N: usize, T: Real>(
     for i in 0..N {
         armature[i] += extra_kg_m2[i];
     }
-    articulated_body(model, at, tau, &armature)
+    let mut posture = Posture::at(model, &at.q);
+    posture.forward_dynamics(model, &at.dq, tau, &armature)
 }
 
 /// A symmetric 6x6 inertia in blocks: moment = I a + H b, force = H' a + M b.
@@ -71,17 +74,39 @@ struct Wrench<T: Real> {
     force: V3<T>,
 }
 
-/// What a joint leaves behind on the way in, for the way out.
-#[derive(Clone, Copy)]
-struct JointShare<T: Real> {
-    passage: Passage<T>,
-    /// c: x and y of the angular part, whose z is 0, and the linear part.
-    bias: [T; 2],
+/// What a joint leaves behind on the way out and in, for the way back.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointShare<T: Real> {
+    /// w, in the link's axes.
+    velocity: V3<T>,
+    /// The linear part of c.
     bias_linear: V3<T>,
     u_moment: V3<T>,
     u_force: V3<T>,
     inverse: T,
     torque: T,
+}
+
+impl<T: Real> JointShare<T> {
+    /// A place for what is not yet known.
+    #[inline(always)]
+    pub(crate) fn zero() -> Self {
+        let (o, zero) = (T::zero(), V3::zero());
+        Self { velocity: zero, bias_linear: zero, u_moment: zero, u_force: zero, inverse: o, torque: o }
+    }
+
+    /// The angular part of c, x and y; its z is 0.
+    #[inline(always)]
+    fn bias(&self, dq: T) -> [T; 2] {
+        [self.velocity.y * dq, -(self.velocity.x * dq)]
+    }
+
+    /// f: what turns with w needs of the joint, were it to keep its speed.
+    #[inline(always)]
+    fn wrench(&self, body: &Body<T>) -> Wrench<T> {
+        let w = &self.velocity;
+        Wrench { moment: w.cross(&apply(&body.about_origin, w)), force: w.cross(&w.cross(&body.first_moment)) }
+    }
 }
 
 impl<T: Real> Articulated<T> {
@@ -172,85 +197,72 @@ impl<T: Real> Articulated<T> {
     }
 }
 
-#[inline(always)]
-fn articulated_body<const N: usize, T: Real>(
-    model: &Model<N, T>,
-    at: &State<N, T>,
-    tau: &Joints<N, T>,
-    armature: &Joints<N, T>,
-) -> Joints<N, T> {
-    let o = T::zero();
-    let zero = V3::zero();
-    let none = Wrench { moment: zero, force: zero };
-    let friction = friction_torque(model, &at.dq);
-    let mut wrench = [none; N];
-    let mut joint = [JointShare {
-        passage: Passage::zero(),
-        bias: [o; 2],
-        bias_linear: zero,
-        u_moment: zero,
-        u_force: zero,
-        inverse: o,
-        torque: o,
-    }; N];
-
-    let mut w = zero;
-    for i in 0..N {
-        let (hinge, dq) = (&model.chain[i], at.dq[i]);
-        let passage = hinge.passage(at.q[i]);
-        let p = V3::of(&hinge.position);
-        joint[i].passage = passage;
-        joint[i].bias_linear = passage.to_child(&w.cross(&w.cross(&p)));
-        w = passage.to_child(&w);
-        joint[i].bias = [w.y * dq, -(w.x * dq)];
-        w.z += dq;
-        let body = Body::of(&hinge.body);
-        wrench[i] =
-            Wrench { moment: w.cross(&apply(&body.about_origin, &w)), force: w.cross(&w.cross(&body.first_moment)) };
-    }
-
-    // What hangs on the joint at hand.
-    let mut beyond: Option<(Articulated<T>, Wrench<T>)> = None;
-    for i in (0..N).rev() {
-        let hinge = &model.chain[i];
-        let body = Body::of(&hinge.body);
-        let share = &mut joint[i];
-        let (inertia, force) = match &beyond {
-            None => (Articulated::rigid(&body), wrench[i]),
-            Some((inertia, more)) => (
-                inertia.plus_rigid(&body),
-                Wrench { moment: wrench[i].moment + more.moment, force: wrench[i].force + more.force },
-            ),
-        };
-        let turned = &inertia.rotational;
-        let u_moment = V3 { x: turned.xz, y: turned.yz, z: turned.zz };
-        let u_force = inertia.coupling.rows[2];
-        let inverse = T::one() / (turned.zz + armature[i]);
-        let torque = tau[i] - friction[i] - force.moment.z;
-        (share.u_moment, share.u_force, share.inverse, share.torque) = (u_moment, u_force, inverse, torque);
-        if i > 0 {
-            let p = V3::of(&hinge.position);
-            let rest = inertia.less_outer(&u_moment, &u_force, inverse);
-            let push = rest.apply(share.bias, &share.bias_linear);
-            let gain = torque * inverse;
-            let moment = u_moment.scaled_plus(gain, &(force.moment + push.moment));
-            let passed = share.passage.to_parent(&u_force.scaled_plus(gain, &(force.force + push.force)));
-            let moment = share.passage.to_parent(&moment) + p.cross(&passed);
-            beyond = Some((rest.to_parent(share.passage, &p), Wrench { moment, force: passed }));
+impl<const N: usize, T: Real> Posture<N, T> {
+    /// [`forward_dynamics`] in this posture, with `armature` (kg m^2) on the diagonal of M in place of the rotor inertia. No heap.
+    #[inline(always)]
+    pub fn forward_dynamics(
+        &mut self,
+        model: &Model<N, T>,
+        dq: &Joints<N, T>,
+        tau: &Joints<N, T>,
+        armature_kg_m2: &Joints<N, T>,
+    ) -> Joints<N, T> {
+        let mut w = V3::zero();
+        for i in 0..N {
+            let (passage, p) = (self.passage(model, i), V3::of(&model.chain[i].position));
+            let share = &mut self.shares[i];
+            share.bias_linear = passage.to_child(&w.cross(&w.cross(&p)));
+            w = passage.to_child(&w);
+            w.z += dq[i];
+            share.velocity = w;
         }
-    }
 
-    let mut ddq = Joints::<N, T>::zeros();
-    let (mut dw, mut a) = (zero, -V3::of(&model.folded_gravity));
-    for i in 0..N {
-        let share = &joint[i];
-        let p = V3::of(&model.chain[i].position);
-        a = share.passage.to_child(&(a + dw.cross(&p))) + share.bias_linear;
-        dw = share.passage.to_child(&dw);
-        dw.x += share.bias[0];
-        dw.y += share.bias[1];
-        ddq[i] = (share.torque - share.u_moment.dot(&dw) - share.u_force.dot(&a)) * share.inverse;
-        dw.z += ddq[i];
+        // What hangs on the joint at hand.
+        let mut beyond: Option<(Articulated<T>, Wrench<T>)> = None;
+        for i in (0..N).rev() {
+            let passage = self.passage(model, i);
+            let hinge = &model.chain[i];
+            let body = Body::of(&hinge.body);
+            let share = &mut self.shares[i];
+            let own = share.wrench(&body);
+            let (inertia, force) = match &beyond {
+                None => (Articulated::rigid(&body), own),
+                Some((inertia, more)) => (
+                    inertia.plus_rigid(&body),
+                    Wrench { moment: own.moment + more.moment, force: own.force + more.force },
+                ),
+            };
+            let turned = &inertia.rotational;
+            let u_moment = V3 { x: turned.xz, y: turned.yz, z: turned.zz };
+            let u_force = inertia.coupling.rows[2];
+            let inverse = T::one() / (turned.zz + armature_kg_m2[i]);
+            let torque = tau[i] - joint_friction(model, i, dq[i]) - force.moment.z;
+            (share.u_moment, share.u_force, share.inverse, share.torque) = (u_moment, u_force, inverse, torque);
+            if i > 0 {
+                let p = V3::of(&hinge.position);
+                let rest = inertia.less_outer(&u_moment, &u_force, inverse);
+                let push = rest.apply(share.bias(dq[i]), &share.bias_linear);
+                let gain = torque * inverse;
+                let moment = u_moment.scaled_plus(gain, &(force.moment + push.moment));
+                let passed = passage.to_parent(&u_force.scaled_plus(gain, &(force.force + push.force)));
+                let moment = passage.to_parent(&moment) + p.cross(&passed);
+                beyond = Some((rest.to_parent(passage, &p), Wrench { moment, force: passed }));
+            }
+        }
+
+        let mut ddq = *tau;
+        let (mut dw, mut a) = (V3::zero(), -V3::of(&model.folded_gravity));
+        for i in 0..N {
+            let (passage, share) = (self.passage(model, i), &self.shares[i]);
+            let p = V3::of(&model.chain[i].position);
+            a = passage.to_child(&(a + dw.cross(&p))) + share.bias_linear;
+            dw = passage.to_child(&dw);
+            let [x, y] = share.bias(dq[i]);
+            dw.x += x;
+            dw.y += y;
+            ddq[i] = (share.torque - share.u_moment.dot(&dw) - share.u_force.dot(&a)) * share.inverse;
+            dw.z += ddq[i];
+        }
+        ddq
     }
-    ddq
 }

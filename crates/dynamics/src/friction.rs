@@ -21,14 +21,20 @@ pub const COULOMB_SPEED_RAD_PER_S: f64 = 0.01;
 /// Friction torque `d dq + f_c tanh(dq / 0.01)`, N m, for `dq` in rad/s; it opposes `dq` when subtracted from the motor's torque.
 #[inline(always)]
 pub fn friction_torque<const N: usize, T: Real>(model: &Model<N, T>, dq: &Joints<N, T>) -> Joints<N, T> {
-    let per_speed = T::from_f64(COULOMB_SPEED_RAD_PER_S.recip());
     let mut torque = *dq;
     for i in 0..N {
-        torque[i] = model.viscous[i] * dq[i];
-        // An arm without Coulomb friction shall not pay for N hyperbolic tangents in each step.
-        if model.has_coulomb_friction {
-            torque[i] += model.coulomb[i] * (dq[i] * per_speed).tanh();
-        }
+        torque[i] = joint_friction(model, i, dq[i]);
+    }
+    torque
+}
+
+/// [`friction_torque`] of one joint.
+#[inline(always)]
+pub(crate) fn joint_friction<const N: usize, T: Real>(model: &Model<N, T>, joint: usize, dq: T) -> T {
+    let mut torque = model.viscous[joint] * dq;
+    // An arm without Coulomb friction shall not pay for N hyperbolic tangents in each step.
+    if model.has_coulomb_friction {
+        torque += model.coulomb[joint] * (dq * T::from_f64(COULOMB_SPEED_RAD_PER_S.recip())).tanh();
     }
     torque
 }

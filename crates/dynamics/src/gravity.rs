@@ -20,8 +20,9 @@ use certune_linsys::{JointMatrix, Joints, Real};
 use nalgebra::Vector3;
 
 use crate::base::Base;
-use crate::local::{Passage, V3};
+use crate::local::V3;
 use crate::model::Model;
+use crate::posture::Posture;
 use crate::spatial::{apply, cross, dot};
 
 /// First moment of each subtree about its own joint's origin, in base axes.
@@ -47,24 +48,31 @@ fn moments<const N: usize, T: Real>(model: &Model<N, T>, base: &Base<N, T>) -> [
 /// In link frames, where the joint's axis is z: `g_i = -(h x a_g)_z` with the subtree's first moment h about the joint's origin.
 #[inline(always)]
 pub fn gravity_torque<const N: usize, T: Real>(model: &Model<N, T>, q: &Joints<N, T>) -> Joints<N, T> {
-    let mut passage = [Passage::zero(); N];
-    let mut fall = [V3::zero(); N];
-    let mut falling = V3::of(&model.folded_gravity);
-    for i in 0..N {
-        passage[i] = model.chain[i].passage(q[i]);
-        falling = passage[i].to_child(&falling);
-        fall[i] = falling;
+    Posture::at(model, q).gravity_torque(model)
+}
+
+impl<const N: usize, T: Real> Posture<N, T> {
+    /// [`gravity_torque`] in this posture. No heap.
+    #[inline(always)]
+    pub fn gravity_torque(&self, model: &Model<N, T>) -> Joints<N, T> {
+        let mut fall = [[T::zero(); 2]; N];
+        let mut falling = V3::of(&model.folded_gravity);
+        for i in 0..N {
+            falling = self.passage(model, i).to_child(&falling);
+            fall[i] = [falling.x, falling.y];
+        }
+        let mut torque = Joints::<N, T>::zeros();
+        let (mut mass, mut moment) = (T::zero(), V3::zero());
+        for i in (0..N).rev() {
+            let hinge = &model.chain[i];
+            moment = moment + V3::of(&hinge.body.first_moment);
+            mass += hinge.body.mass;
+            let [x, y] = fall[i];
+            torque[i] = moment.y.mul_add(x, -(moment.x * y));
+            moment = V3::of(&hinge.position).scaled_plus(mass, &self.passage(model, i).to_parent(&moment));
+        }
+        torque
     }
-    let mut torque = *q;
-    let (mut mass, mut moment) = (T::zero(), V3::zero());
-    for i in (0..N).rev() {
-        let hinge = &model.chain[i];
-        moment = moment + V3::of(&hinge.body.first_moment);
-        mass += hinge.body.mass;
-        torque[i] = moment.y.mul_add(fall[i].x, -(moment.x * fall[i].y));
-        moment = V3::of(&hinge.position).scaled_plus(mass, &passage[i].to_parent(&moment));
-    }
-    torque
 }
 
 /// `dg/dq` at `q` (rad): symmetric to the bit, N m/rad. O(N^2), no heap.

@@ -7,6 +7,7 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 
+pub mod hyperbolic;
 mod scalar;
 #[cfg(feature = "std")]
 mod spectrum;

@@ -8,7 +8,7 @@
 use core::fmt::{Debug, Formatter};
 use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
-use certune_linsys::{Lanes, Real, trig};
+use certune_linsys::{Lanes, Real, hyperbolic, trig};
 use num_traits::{Float, One, Zero};
 use pulp::{Simd, bytemuck};
 
@@ -30,12 +30,6 @@ impl<S: Simd> Pack<S> {
     #[inline(always)]
     fn numbers(&self) -> &[f64] {
         bytemuck::cast_slice(core::slice::from_ref(&self.0))
-    }
-
-    /// Each lane by a function of numbers.
-    #[inline(always)]
-    fn each(self, of: impl Fn(f64) -> f64) -> Self {
-        Self::from_lanes(|lane| of(self.lane(lane)))
     }
 }
 
@@ -142,7 +136,7 @@ impl<S: Simd> Real for Pack<S> {
     }
     #[inline(always)]
     fn tanh(self) -> Self {
-        self.each(Float::tanh)
+        hyperbolic::tanh(self)
     }
     #[inline(always)]
     fn choose(self, bound: Self, then: Self, otherwise: Self) -> Self {

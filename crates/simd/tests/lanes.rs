@@ -1,7 +1,7 @@
 //! Contract: on every instruction set of this machine each lane holds what the number alone would give.
 #![expect(clippy::unwrap_used, reason = "helpers of tests")]
 
-use certune_linsys::trig;
+use certune_linsys::{hyperbolic, trig};
 use certune_simd::{InstructionSet, Kernel, Lanes};
 use proptest::prelude::*;
 
@@ -57,6 +57,7 @@ fn assert_agree(a: &[f64], b: &[f64]) {
                 let size = match *name {
                     // Polynomials with and without a fused multiply-add.
                     "sine" | "cosine" => 2.0 * trig::ERROR,
+                    "tanh" => hyperbolic::ERROR,
                     "fused" => (1.0 + (a[lane] * b[lane]).abs()) * f64::EPSILON,
                     _ => 0.0,
                 };

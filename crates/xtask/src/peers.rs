@@ -3,6 +3,9 @@
 //! The peers come from PyPI into `target/peers`, their C and C++ programs (`crates/xtask/peers/`) are compiled there once, at -O3 -march=native. Ours is the bench
 //! `yardstick` of `certune-closed-loop`, compiled as a user would. Each row is measured in rounds, ours and theirs in turn on one core by the thread's CPU
 //! time, so that a busy machine slows both; the medians are compared.
+//!
+//! The column "of peak" is `operations / (ns * peak)`: the operations of a work are counted by a scalar that counts, the peak is what chains of multiply-adds in
+//! the machine's widest registers reach on one core in the same run.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -29,6 +32,12 @@ const ROWS: [(&str, &str, Peer, &str, f64); 10] = [
     ("gravity torque, one state", "gravity", Peer::Pinocchio, "gravity", 1.0),
     ("AIC step, 7 joints", "aic", Peer::Pinocchio, "aic", 1.0),
 ];
+
+/// The most that an MRAC step may cost, in AIC steps.
+const MRAC_AIM: f64 = 20.0;
+
+/// The most that a chain may be off the line through all of them, per cent.
+const LINE_AIM: f64 = 20.0;
 
 /// Joints of the chains whose cost should grow along a line.
 const CHAINS: [usize; 5] = [2, 4, 7, 14, 28];
@@ -63,6 +72,11 @@ impl Programs {
             Peer::MuJoCo => (&self.mujoco, &self.mjcf),
             Peer::Pinocchio => (&self.pinocchio, &self.model),
         }
+    }
+
+    /// What our program says to these words.
+    fn ours(&self, words: &[&str]) -> Result<f64, String> {
+        number(&said(Command::new(&self.ours).args(words))?)
     }
 
     fn ours_ns(&self, work: &str) -> Result<f64, String> {
@@ -218,42 +232,47 @@ fn table(programs: &Programs) -> Outcome {
                 seen.push(programs.theirs_ns(peer, their_work)?);
             }
         }
+        ours.entry("mrac").or_default().push(programs.ours_ns("mrac")?);
     }
-    println!("\n{:<32} {:>9} {:>9}  {:<10} {:>7} {:>7}", "work, ns", "ours", "peer", "", "share", "aim");
-    for (title, work, peer, their_work, aim) in ROWS {
-        let (mine, other) = (median(ours[work].clone()), median(theirs[&(peer, their_work)].clone()));
+    let peak = median((0..ROUNDS).map(|_| programs.ours(&["peak"])).collect::<Result<_, _>>()?);
+    let of_peak = |work: &str, ns: f64| Ok::<_, String>(100.0 * programs.ours(&["operations", work])? / (ns * peak));
+    println!("\none core's peak: {peak:.1} operations a ns");
+    println!("{:<32} {:>9} {:>8} {:>9}  {:<10} {:>7} {:>7}", "work, ns", "ours", "of peak", "peer", "", "share", "aim");
+    let print = |title: &str, mine: f64, of_peak: f64, other: f64, name: &str, aim: f64| {
         let share = mine / other;
         let met = if share <= aim { "" } else { "  not met" };
-        println!("{title:<32} {mine:>9.1} {other:>9.1}  {:<10} {share:>7.3} {aim:>7.3}{met}", peer.name());
+        println!("{title:<32} {mine:>9.1} {of_peak:>6.1} % {other:>9.1}  {name:<10} {share:>7.3} {aim:>7.3}{met}");
+    };
+    for (title, work, peer, their_work, aim) in ROWS {
+        let (mine, other) = (median(ours[work].clone()), median(theirs[&(peer, their_work)].clone()));
+        print(title, mine, of_peak(work, mine)?, other, peer.name(), aim);
     }
-    let mrac = median((0..ROUNDS).map(|_| programs.ours_ns("mrac")).collect::<Result<_, _>>()?);
-    let aic = median(ours["aic"].clone());
-    println!(
-        "{:<32} {mrac:>9.1} {aic:>9.1}  {:<10} {:>7.3} {:>7.3}",
-        "MRAC step, against the AIC's",
-        "our AIC",
-        mrac / aic,
-        20.0
-    );
+    let (mrac, aic) = (median(ours["mrac"].clone()), median(ours["aic"].clone()));
+    print("MRAC step over AIC step", mrac, of_peak("mrac", mrac)?, aic, "our AIC", MRAC_AIM);
     Ok(())
 }
 
 /// The closed loop of chains against the number of joints, and how far it is from a straight line.
 fn lines(programs: &Programs) -> Outcome {
-    let mut points = Vec::new();
-    for joints in CHAINS {
-        let work = format!("chain-{joints}");
-        let ns = median((0..5).map(|_| programs.ours_ns(&work)).collect::<Result<_, _>>()?);
-        points.push((joints as f64, ns));
+    let mut seen = CHAINS.map(|joints| (joints, Vec::new()));
+    for _ in 0..ROUNDS {
+        for (joints, ns) in &mut seen {
+            ns.push(programs.ours_ns(&format!("chain-{joints}"))?);
+        }
     }
+    let points = seen.map(|(joints, ns)| (joints as f64, median(ns)));
     let count = points.len() as f64;
     let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
     let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
     let slope = mean(&|p| (p.0 - x) * (p.1 - y)) / mean(&|p| (p.0 - x) * (p.0 - x));
-    println!("\nclosed loop of chains: {slope:.1} ns a joint");
-    for (joints, ns) in points {
-        let line = y + slope * (joints - x);
-        println!("{joints:>4.0} joints {ns:>9.1} ns, {:+.1} % of the line", 100.0 * (ns / line - 1.0));
+    let at = |joints: f64| y + slope * (joints - x);
+    let off = |(joints, ns): &(f64, f64)| 100.0 * (ns / at(*joints) - 1.0);
+    println!("\nclosed loop of chains, least squares: {:.1} ns + {slope:.1} ns a joint", at(0.0));
+    for point in &points {
+        println!("{:>4.0} joints {:>9.1} ns, {:+.1} % of the line", point.0, point.1, off(point));
     }
+    let worst = points.iter().map(|point| off(point).abs()).fold(0.0, f64::max);
+    let met = if worst <= LINE_AIM { "" } else { "  not met" };
+    println!("worst deviation {worst:.1} %, aim {LINE_AIM:.0} %{met}");
     Ok(())
 }

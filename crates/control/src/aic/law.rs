@@ -44,12 +44,12 @@ pub struct BeliefGradient<const N: usize, T: Real = f64> {
     pub ddmu: Joints<N, T>,
 }
 
-/// What the beliefs leave unexplained: two measurement errors and two model errors.
-struct PredictionErrors<const N: usize, T: Real> {
-    q: Joints<N, T>,
-    dq: Joints<N, T>,
-    mu: Joints<N, T>,
-    dmu: Joints<N, T>,
+/// What the beliefs about a joint leave unexplained: two measurement errors and two model errors.
+struct PredictionErrors<T> {
+    q: T,
+    dq: T,
+    mu: T,
+    dmu: T,
 }
 
 impl<const N: usize, T: Real> Aic<N, T> {
@@ -76,14 +76,15 @@ impl<const N: usize, T: Real> Aic<N, T> {
     ///
     /// A diagnostic; the step does not use it. O(N).
     pub fn free_energy(&self, state: &AicState<N, T>, measurement: &Measurement<N, T>, goal: &Joints<N, T>) -> T {
-        let error = self.prediction_errors(state, measurement, goal);
-        let weighted =
-            |error: &Joints<N, T>, precision: &Joints<N, T>| error.component_mul(error).component_mul(precision).sum();
-        let sum = weighted(&error.q, &self.precision_q)
-            + weighted(&error.dq, &self.precision_dq)
-            + weighted(&error.mu, &self.precision_mu)
-            + weighted(&error.dmu, &self.precision_dmu);
-        T::from_f64(0.5) * sum
+        let mut sum = PredictionErrors { q: T::zero(), dq: T::zero(), mu: T::zero(), dmu: T::zero() };
+        for i in 0..N {
+            let error = self.prediction_errors(i, state, measurement, goal);
+            sum.q += error.q * error.q * self.precision_q[i];
+            sum.dq += error.dq * error.dq * self.precision_dq[i];
+            sum.mu += error.mu * error.mu * self.precision_mu[i];
+            sum.dmu += error.dmu * error.dmu * self.precision_dmu[i];
+        }
+        T::from_f64(0.5) * (sum.q + sum.dq + sum.mu + sum.dmu)
     }
 
     /// The gradient of [`Aic::free_energy`] with respect to the beliefs in `state`. O(N).
@@ -94,34 +95,46 @@ impl<const N: usize, T: Real> Aic<N, T> {
         measurement: &Measurement<N, T>,
         goal: &Joints<N, T>,
     ) -> BeliefGradient<N, T> {
-        let error = self.prediction_errors(state, measurement, goal);
-        // Joint by joint, in place of vector expressions, so that lanes stay in registers.
         let mut gradient = BeliefGradient { mu: *goal, dmu: *goal, ddmu: *goal };
         for i in 0..N {
-            let model_mu = error.mu[i] * self.precision_mu[i];
-            let model_dmu = error.dmu[i] * self.precision_dmu[i];
-            gradient.mu[i] = model_mu * self.rate_per_s[i] - error.q[i] * self.precision_q[i];
-            gradient.dmu[i] = model_mu + model_dmu * self.rate_per_s[i] - error.dq[i] * self.precision_dq[i];
-            gradient.ddmu[i] = model_dmu;
+            [gradient.mu[i], gradient.dmu[i], gradient.ddmu[i]] = self.joint_gradient(i, state, measurement, goal);
         }
         gradient
+    }
+
+    /// ∂F/∂μ, ∂F/∂μ′, ∂F/∂μ″ of one joint: no joint's beliefs enter those of another.
+    #[inline(always)]
+    fn joint_gradient(
+        &self,
+        i: usize,
+        state: &AicState<N, T>,
+        measurement: &Measurement<N, T>,
+        goal: &Joints<N, T>,
+    ) -> [T; 3] {
+        let error = self.prediction_errors(i, state, measurement, goal);
+        let model_mu = error.mu * self.precision_mu[i];
+        let model_dmu = error.dmu * self.precision_dmu[i];
+        [
+            model_mu * self.rate_per_s[i] - error.q * self.precision_q[i],
+            model_mu + model_dmu * self.rate_per_s[i] - error.dq * self.precision_dq[i],
+            model_dmu,
+        ]
     }
 
     #[inline(always)]
     fn prediction_errors(
         &self,
+        i: usize,
         state: &AicState<N, T>,
         measurement: &Measurement<N, T>,
         goal: &Joints<N, T>,
-    ) -> PredictionErrors<N, T> {
-        let mut error = PredictionErrors { q: *goal, dq: *goal, mu: *goal, dmu: *goal };
-        for i in 0..N {
-            error.q[i] = measurement.q[i] - state.mu[i];
-            error.dq[i] = measurement.dq[i] - state.dmu[i];
-            error.mu[i] = (state.mu[i] - goal[i]).mul_add(self.rate_per_s[i], state.dmu[i]);
-            error.dmu[i] = state.dmu[i].mul_add(self.rate_per_s[i], state.ddmu[i]);
+    ) -> PredictionErrors<T> {
+        PredictionErrors {
+            q: measurement.q[i] - state.mu[i],
+            dq: measurement.dq[i] - state.dmu[i],
+            mu: (state.mu[i] - goal[i]).mul_add(self.rate_per_s[i], state.dmu[i]),
+            dmu: state.dmu[i].mul_add(self.rate_per_s[i], state.ddmu[i]),
         }
-        error
     }
 }
 
@@ -158,19 +171,31 @@ impl<const N: usize, T: Real> Controller<N, T> for Aic<N, T> {
         measurement: &Measurement<N, T>,
         goal: &Joints<N, T>,
     ) -> (AicState<N, T>, Joints<N, T>) {
+        let mut next = *state;
+        let u = self.advance(&mut next, measurement, goal);
+        (next, u)
+    }
+
+    #[inline(always)]
+    fn advance(
+        &self,
+        state: &mut AicState<N, T>,
+        measurement: &Measurement<N, T>,
+        goal: &Joints<N, T>,
+    ) -> Joints<N, T> {
         let gradient = self.free_energy_gradient(state, measurement, goal);
         let h = self.step_s;
-        let mut next = *state;
         for i in 0..N {
             let kappa = self.kappa_mu[i];
-            next.mu[i] = (state.dmu[i] - kappa * gradient.mu[i]).mul_add(h, state.mu[i]);
-            next.dmu[i] = (state.ddmu[i] - kappa * gradient.dmu[i]).mul_add(h, state.dmu[i]);
-            next.ddmu[i] = (-(kappa * gradient.ddmu[i])).mul_add(h, state.ddmu[i]);
+            // μ reads μ′ and μ′ reads μ″ before they move on.
+            state.mu[i] = (state.dmu[i] - kappa * gradient.mu[i]).mul_add(h, state.mu[i]);
+            state.dmu[i] = (state.ddmu[i] - kappa * gradient.dmu[i]).mul_add(h, state.dmu[i]);
+            state.ddmu[i] = (-(kappa * gradient.ddmu[i])).mul_add(h, state.ddmu[i]);
             // The authors' order: the torque descends with the beliefs just updated.
-            let surprise = (measurement.q[i] - next.mu[i]) * self.precision_q[i]
-                + (measurement.dq[i] - next.dmu[i]) * self.precision_dq[i];
-            next.u[i] = (-(self.kappa_a[i] * surprise)).mul_add(h, state.u[i]);
+            let surprise = (measurement.q[i] - state.mu[i]) * self.precision_q[i]
+                + (measurement.dq[i] - state.dmu[i]) * self.precision_dq[i];
+            state.u[i] = (-(self.kappa_a[i] * surprise)).mul_add(h, state.u[i]);
         }
-        (next, next.u)
+        state.u
     }
 }

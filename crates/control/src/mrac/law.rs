@@ -1,4 +1,7 @@
 //! The sampling step of the three adaptive laws.
+//!
+//! An adaptive gain is a sum of outer products with the signal that it multiplies, and `(a bᵀ) s = a (b . s)`: the step needs of the present and the last sample
+//! two scalar products a signal, and passes once over each integral, which it reads and then adds to. [`Mrac::adaptive_gains`] writes the gains out.
 
 use certune_linsys::{JointMatrix, Joints, Real};
 
@@ -23,6 +26,8 @@ pub struct Mrac<const N: usize, T: Real = f64> {
     e1: [Joints<N, T>; 3],
     f0: [Joints<N, T>; 3],
     f1: [Joints<N, T>; 3],
+    /// Whether any derivative gain is above zero.
+    derivatives: bool,
 }
 
 /// What the law sees at one sampling instant.
@@ -139,23 +144,30 @@ impl<const N: usize, T: Real> Mrac<N, T> {
             e1: splat3(&gains.e1),
             f0: splat3(&gains.f0),
             f1: splat3(&gains.f1),
+            derivatives: [&gains.alpha, &gains.e0, &gains.e1, &gains.f0, &gains.f1]
+                .iter()
+                .any(|family| family[2].iter().any(|gain| *gain > 0.0)),
         }
     }
 
     /// What the law sees: the measurement, the reference it tracks, and the modified error between them.
+    #[inline(always)]
     pub fn signals(
         &self,
         state: &MracState<N, T>,
         measurement: &Measurement<N, T>,
         goal: &Joints<N, T>,
     ) -> Signals<N, T> {
+        let Measurement { q, dq } = *measurement;
         let (q_ref, dq_ref) = match self.law {
             MracLaw::ReferenceModel => (state.q_ref, state.dq_ref),
             MracLaw::RawGoal | MracLaw::ReleasedCode => (*goal, Joints::zeros()),
         };
-        let Measurement { q, dq } = *measurement;
-        let q_e = self.p2.component_mul(&(q_ref - q)) + self.p3.component_mul(&(dq_ref - dq));
-        Signals { q_e, q, dq, q_ref, dq_ref }
+        let mut seen = Signals { q_e: q, q, dq, q_ref, dq_ref };
+        for i in 0..N {
+            seen.q_e[i] = self.p2[i] * (seen.q_ref[i] - q[i]) + self.p3[i] * (seen.dq_ref[i] - dq[i]);
+        }
+        seen
     }
 
     /// The adaptive gains that [`Controller::step`] uses on the same arguments: a diagnostic of their drift. O(N²).
@@ -195,31 +207,120 @@ impl<const N: usize, T: Real> Mrac<N, T> {
         }
     }
 
-    fn advance(
-        &self,
-        state: &MracState<N, T>,
-        signals: Signals<N, T>,
-        now: &Products<N, T>,
-        goal: &Joints<N, T>,
-    ) -> MracState<N, T> {
-        let (q_ref, dq_ref) = match self.law {
-            MracLaw::ReferenceModel => {
-                let pull = self.omega_squared.component_mul(&(goal - state.q_ref));
-                let ddq_ref = pull - self.two_zeta_omega.component_mul(&state.dq_ref);
-                let dq_ref = state.dq_ref + ddq_ref * self.step_s;
-                (state.q_ref + dq_ref * self.step_s, dq_ref)
+    /// `g₂ ∫ q_e sᵀ dt s` of the four signals and of the error itself; the integrals grow by the present sample once they are read.
+    #[inline(always)]
+    fn integral_terms(&self, integral: &mut Products<N, T>, seen: &Signals<N, T>) -> [T; N] {
+        let o = T::zero();
+        let mut growth = [o; N];
+        for i in 0..N {
+            growth[i] = seen.q_e[i] * self.product_step;
+        }
+        let (mut of_q, mut of_dq, mut of_q_ref, mut of_dq_ref) = ([o; N], [o; N], [o; N], [o; N]);
+        read_and_grow(&mut integral.q, &seen.q, &growth, &mut of_q);
+        read_and_grow(&mut integral.dq, &seen.dq, &growth, &mut of_dq);
+        read_and_grow(&mut integral.q_ref, &seen.q_ref, &growth, &mut of_q_ref);
+        match self.law {
+            MracLaw::ReferenceModel => read_and_grow(&mut integral.dq_ref, &seen.dq_ref, &growth, &mut of_dq_ref),
+            // q̇_r = 0.
+            MracLaw::RawGoal => {}
+            // K₁ reads K₀'s sum, after it has grown by the present sample.
+            MracLaw::ReleasedCode => {
+                of_dq = [o; N];
+                read(&integral.q, &seen.dq, &mut of_dq);
             }
-            MracLaw::RawGoal | MracLaw::ReleasedCode => (state.q_ref, state.dq_ref),
-        };
-        let integral = Products {
-            q_e: state.integral.q_e + now.q_e * self.step_s,
-            q: state.integral.q + now.q * self.product_step,
-            dq: state.integral.dq + now.dq * self.product_step,
-            q_ref: state.integral.q_ref + now.q_ref * self.product_step,
-            dq_ref: state.integral.dq_ref + now.dq_ref * self.product_step,
-        };
-        MracState { q_ref, dq_ref, integral, last: Some(signals) }
+        }
+        let mut torque = [o; N];
+        for i in 0..N {
+            torque[i] = self.e0[1][i] * of_q[i]
+                + self.e1[1][i] * of_dq[i]
+                + self.f0[1][i] * of_q_ref[i]
+                + self.f1[1][i] * of_dq_ref[i]
+                + self.alpha[1][i] * integral.q_e[i];
+            integral.q_e[i] += seen.q_e[i] * self.step_s;
+        }
+        torque
     }
+
+    /// The proportional terms, all in `q_e`: `(q_e sᵀ) s = q_e |s|²`.
+    #[inline(always)]
+    fn proportional_terms(&self, seen: &Signals<N, T>, torque: &mut [T; N]) {
+        let [q, dq, q_ref, dq_ref] = along(seen, seen);
+        for i in 0..N {
+            let gain = self.e0[0][i] * q
+                + self.e1[0][i] * dq
+                + self.f0[0][i] * q_ref
+                + self.f1[0][i] * dq_ref
+                + self.alpha[0][i];
+            torque[i] += gain * seen.q_e[i];
+        }
+    }
+
+    /// The derivative terms: `((q_e sᵀ - q_e' s'ᵀ)/h) s`, the last sample's with a prime.
+    #[inline(always)]
+    fn derivative_terms(&self, seen: &Signals<N, T>, last: &Signals<N, T>, torque: &mut [T; N]) {
+        let (now, before) = (along(seen, seen), along(last, seen));
+        for i in 0..N {
+            let change = |signal: usize| seen.q_e[i] * now[signal] - last.q_e[i] * before[signal];
+            let changes = self.e0[2][i] * change(0)
+                + self.e1[2][i] * change(1)
+                + self.f0[2][i] * change(2)
+                + self.f1[2][i] * change(3)
+                + self.alpha[2][i] * (seen.q_e[i] - last.q_e[i]);
+            torque[i] += changes * self.samples_per_s;
+        }
+    }
+
+    /// Semi-implicit Euler of the reference model.
+    #[inline(always)]
+    fn advance_reference(&self, state: &mut MracState<N, T>, goal: &Joints<N, T>) {
+        for i in 0..N {
+            let pull = self.omega_squared[i] * (goal[i] - state.q_ref[i]);
+            let ddq_ref = pull - self.two_zeta_omega[i] * state.dq_ref[i];
+            state.dq_ref[i] += ddq_ref * self.step_s;
+            state.q_ref[i] += state.dq_ref[i] * self.step_s;
+        }
+    }
+}
+
+/// `torque += integral signal`, then `integral += growth signalᵀ`, in one pass over the columns.
+#[inline(always)]
+fn read_and_grow<const N: usize, T: Real>(
+    integral: &mut JointMatrix<N, T>,
+    signal: &Joints<N, T>,
+    growth: &[T; N],
+    torque: &mut [T; N],
+) {
+    for j in 0..N {
+        let (column, s) = (&mut integral.data.0[j], signal[j]);
+        for i in 0..N {
+            torque[i] = column[i].mul_add(s, torque[i]);
+            column[i] = growth[i].mul_add(s, column[i]);
+        }
+    }
+}
+
+/// `torque += integral signal`.
+#[inline(always)]
+fn read<const N: usize, T: Real>(integral: &JointMatrix<N, T>, signal: &Joints<N, T>, torque: &mut [T; N]) {
+    for j in 0..N {
+        let (column, s) = (&integral.data.0[j], signal[j]);
+        for i in 0..N {
+            torque[i] = column[i].mul_add(s, torque[i]);
+        }
+    }
+}
+
+/// The scalar products of the four signals of two samples.
+#[inline(always)]
+fn along<const N: usize, T: Real>(a: &Signals<N, T>, b: &Signals<N, T>) -> [T; 4] {
+    let mut sums = [T::zero(); 4];
+    for i in 0..N {
+        sums[0] = a.q[i].mul_add(b.q[i], sums[0]);
+        sums[1] = a.dq[i].mul_add(b.dq[i], sums[1]);
+        sums[2] = a.q_ref[i].mul_add(b.q_ref[i], sums[2]);
+        sums[3] = a.dq_ref[i].mul_add(b.dq_ref[i], sums[3]);
+    }
+    sums
 }
 
 impl<const N: usize, T: Real> Controller<N, T> for Mrac<N, T> {
@@ -230,24 +331,36 @@ impl<const N: usize, T: Real> Controller<N, T> for Mrac<N, T> {
         MracState { q_ref: at.q, dq_ref: Joints::zeros(), integral: Products::zeros(), last: None }
     }
 
+    #[inline(always)]
     fn step(
         &self,
         state: &MracState<N, T>,
         measurement: &Measurement<N, T>,
         goal: &Joints<N, T>,
     ) -> (MracState<N, T>, Joints<N, T>) {
-        let signals = self.signals(state, measurement, goal);
-        let now = Products::of(&signals);
-        let gains = self.gains_at(state, &now);
-        let u = times(&gains.K0, &signals.q)
-            + times(&gains.K1, &signals.dq)
-            + times(&gains.Q0, &signals.q_ref)
-            + times(&gains.Q1, &signals.dq_ref)
-            + gains.f;
-        (self.advance(state, signals, &now, goal), u)
+        let mut next = *state;
+        let u = self.advance(&mut next, measurement, goal);
+        (next, u)
     }
-}
 
-fn times<const N: usize, T: Real>(matrix: &JointMatrix<N, T>, vector: &Joints<N, T>) -> Joints<N, T> {
-    matrix * vector
+    /// The torque of [`AdaptiveGains`], without forming them: of each outer product only what it does to its own signal is needed.
+    #[inline(always)]
+    fn advance(
+        &self,
+        state: &mut MracState<N, T>,
+        measurement: &Measurement<N, T>,
+        goal: &Joints<N, T>,
+    ) -> Joints<N, T> {
+        let seen = self.signals(state, measurement, goal);
+        let mut torque = self.integral_terms(&mut state.integral, &seen);
+        self.proportional_terms(&seen, &mut torque);
+        if let (true, Some(last)) = (self.derivatives, &state.last) {
+            self.derivative_terms(&seen, last, &mut torque);
+        }
+        state.last = Some(seen);
+        if self.law == MracLaw::ReferenceModel {
+            self.advance_reference(state, goal);
+        }
+        Joints::from(torque)
+    }
 }
