@@ -7,6 +7,7 @@
 //! * [`Cma`] is one run of CMA-ES, the covariance matrix adaptation evolution
 //!   strategy: few assumptions, robust against noise and ill-conditioning.
 //! * [`Bipop`] restarts it with large and small populations: for many optima.
+//! * [`Scatter`] draws points over the whole box, to know where to start.
 //! * [`NelderMead`] is a simplex polish for the last digits in few dimensions.
 //!
 //! A search is a plain value: it can be written at any moment and, read again,
@@ -36,9 +37,11 @@ mod cma;
 mod gauss;
 mod nelder_mead;
 mod plain;
+mod scatter;
 mod search;
 
 pub use bipop::{Bipop, BipopOptions};
 pub use cma::{Cma, Options, Parameters};
 pub use nelder_mead::{Coefficients, NelderMead, NelderMeadOptions};
+pub use scatter::Scatter;
 pub use search::{Best, Ending, Search, SetupError, TellError};

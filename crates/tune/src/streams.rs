@@ -13,3 +13,5 @@ pub const FILTER_CONFIGURATIONS: u64 = 1 << 62;
 pub const SWARM: u64 = (1 << 62) + 1;
 /// CMA-ES.
 pub const CMA_ES: u64 = (1 << 62) + 2;
+/// Points over the whole space.
+pub const SCATTER: u64 = (1 << 62) + 3;

@@ -193,6 +193,7 @@ fn search(record: &RunRecord) -> SearchRecord {
         let phase = match evaluation.phase {
             Phase::Start => "start",
             Phase::Simplex => "nelder-mead",
+            Phase::Scatter => "scatter",
             Phase::CmaEs { .. } => "cma-es",
             Phase::Polish => "polish",
             Phase::Swarm { .. } => "particle-swarm",

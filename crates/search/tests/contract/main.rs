@@ -5,3 +5,4 @@ mod bipop;
 mod cma;
 mod common;
 mod nelder_mead;
+mod scatter;

@@ -2,7 +2,7 @@
 //!
 //! | method | what it does |
 //! |--------|--------------|
-//! | [`Method::Schedule`] | Nelder-Mead from the start, CMA-ES with restarts over the whole space, Nelder-Mead around the best |
+//! | [`Method::Schedule`] | Nelder-Mead from the start, CMA-ES with restarts where a look at the whole space says, Nelder-Mead around the best |
 //! | [`Method::CmaEs`] | CMA-ES with restarts from the start, or from the middle of the space |
 //! | [`Method::NelderMead`] | Nelder-Mead from the start, or from the middle, set up anew as often as that finds something better |
 //! | [`Method::ParticleSwarm`] | particle swarm from random points. A start is evaluated first, so that the record can compare, but the swarm does not see it |
@@ -66,6 +66,8 @@ pub enum Phase {
     Start,
     /// Nelder-Mead from the start.
     Simplex,
+    /// Points over the whole space.
+    Scatter,
     /// CMA-ES.
     CmaEs {
         /// 0 for the first run, then the number of the restart.

@@ -1,16 +1,17 @@
-//! The default: Nelder-Mead from the start, CMA-ES over the whole space, Nelder-Mead again around the best.
+//! The default: Nelder-Mead from the start, CMA-ES where a look at the whole space says, Nelder-Mead again around the best.
 //!
 //! ```text
-//! simplex    from the start              until it converges, gains nothing for a while, or has spent a fifth of the budget
-//! cma-es     from the middle, restarted  until eight tenths of the budget are spent
-//! polish     around the best             until it converges
-//! cma-es     goes on                     until the budget is spent
+//! simplex    from the start                until it converges, gains nothing for a while, or has spent a fifth of the budget
+//! scatter    over the whole space          eight points a gain, at most a fifth of the budget
+//! cma-es     from the best of the scatter  until eight tenths of the budget are spent
+//! polish     around the best               until it converges
+//! cma-es     goes on, restarted            until the budget is spent
 //! ```
 //!
-//! Published gains are good, so the simplex improves on them at once, but it stays in their basin; CMA-ES sees the space; the last digits are the simplex's again.
+//! Published gains are good, so the simplex improves on them at once, but it stays in their basin; the scatter sees others; the last digits are the simplex's again.
 
 use argmin::core::Error;
-use certune_search::{Bipop, BipopOptions, Options};
+use certune_search::{Bipop, BipopOptions, Options, Scatter, Search};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
@@ -30,9 +31,15 @@ const POLISH: f64 = 0.03;
 fn cma_es(centre: &[f64], settings: &SearchSettings) -> Result<Bipop, Error> {
     // Scores below each other by less than nobody can tell apart are a flat valley: the run begins anew elsewhere.
     let run = Options { tol_fun: score_of_ratio(SPREAD), tol_x: 1e-3, ..Options::default() };
+    let seed = chance(settings, streams::CMA_ES);
+    Ok(Bipop::new(centre, SIGMA, seed, BipopOptions { run, sigma: SIGMA, ..BipopOptions::default() })?)
+}
+
+/// The seed that belongs to a part of the search.
+fn chance(settings: &SearchSettings, stream: u64) -> u64 {
     let mut chance = ChaCha8Rng::seed_from_u64(settings.seed);
-    chance.set_stream(streams::CMA_ES);
-    Ok(Bipop::new(centre, SIGMA, chance.next_u64(), BipopOptions { run, sigma: SIGMA, ..BipopOptions::default() })?)
+    chance.set_stream(stream);
+    chance.next_u64()
 }
 
 fn restart_of(search: &Bipop) -> Phase {
@@ -59,7 +66,7 @@ pub(super) fn simplex_alone(
     })
 }
 
-/// The whole schedule; without a `start` it begins with CMA-ES.
+/// The whole schedule; without a `start` it begins with the scatter.
 pub(super) fn schedule(
     ledger: &Ledger<'_>,
     start: Option<&[f64]>,
@@ -74,7 +81,12 @@ pub(super) fn schedule(
             return Ok(Termination::BudgetSpent);
         }
     }
-    let mut search = cma_es(&vec![0.5; dimension], settings)?;
+    let mut scatter = Scatter::new(dimension, (8 * dimension).min(budget / 5), chance(settings, streams::SCATTER))?;
+    if run(ledger, &mut scatter, |_| Phase::Scatter, || false)? == Left::BudgetSpent {
+        return Ok(Termination::BudgetSpent);
+    }
+    let centre = scatter.best().map_or_else(|| vec![0.5; dimension], |best| best.point.clone());
+    let mut search = cma_es(&centre, settings)?;
     let polish_from = budget - budget / 5;
     let mut left = run(ledger, &mut search, restart_of, || ledger.len() >= polish_from)?;
     if left != Left::BudgetSpent
