@@ -91,6 +91,19 @@ pub(crate) fn shared_solution(vertices: &[DMatrix<f64>], regions: &[PlaneRegion]
     solutions.find(|p| serves(p, vertices, regions))
 }
 
+/// Each vertex's own solution, if interpolating them serves: `F(P_i, A_j) + F(P_j, A_i) < 0` for every two.
+pub(crate) fn own_solutions(vertices: &[DMatrix<f64>], regions: &[PlaneRegion]) -> Option<Vec<DMatrix<f64>>> {
+    let own = |region| vertices.iter().map(|a| solution(a, region)).collect::<Option<Vec<_>>>();
+    let mixed = |p: &[DMatrix<f64>], i: usize, j: usize, region: &PlaneRegion| {
+        definite(&-(form(region, &p[i], &vertices[j]) + form(region, &p[j], &vertices[i])))
+    };
+    let serve = |p: &Vec<DMatrix<f64>>| {
+        (0..p.len())
+            .all(|i| definite(&p[i]) && regions.iter().all(|region| (i..p.len()).all(|j| mixed(p, i, j, region))))
+    };
+    regions.iter().filter_map(own).find(serve)
+}
+
 /// Whether `P > 0` and `F(P, A) < 0` everywhere, clear of rounding.
 pub(crate) fn serves(p: &DMatrix<f64>, vertices: &[DMatrix<f64>], regions: &[PlaneRegion]) -> bool {
     definite(p) && vertices.iter().all(|a| regions.iter().all(|region| definite(&-form(region, p, a))))
@@ -127,6 +140,23 @@ pub(crate) fn parts(region: &PlaneRegion) -> [DMatrix<f64>; 2] {
 /// `F(P, A) = L (x) P + M (x) (P A) + M' (x) (A'P)`.
 pub(crate) fn form(region: &PlaneRegion, p: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
     let [l, m] = parts(region);
-    let product = p * a;
+    let product = product(p, a);
     l.kronecker(p) + m.kronecker(&product) + m.transpose().kronecker(&product.transpose())
+}
+
+/// `P A`. A program reads its coefficients off at matrices with an entry or two, for which the dense product would be nearly all of its assembly.
+fn product(p: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
+    let nonzero = || p.iter().enumerate().filter(|(_, x)| **x != 0.0);
+    let rows = p.nrows();
+    if nonzero().nth(rows).is_some() {
+        return p * a;
+    }
+    let mut product = DMatrix::zeros(rows, a.ncols());
+    for (index, &x) in nonzero() {
+        let (row, k) = (index % rows, index / rows);
+        for j in 0..a.ncols() {
+            product[(row, j)] += x * a[(k, j)];
+        }
+    }
+    product
 }

@@ -6,6 +6,7 @@
 //! | what | of which family | file |
 //! |---|---|---|
 //! | the solution of one Lyapunov equation | one matrix and one half plane or disk: always there; any other: where one serves all | `equation` |
+//! | the solutions of the vertices' equations, interpolated | where a matrix for each vertex is asked for and they serve | `equation` |
 //! | a common matrix, by Newton's method | order above 12 | `common_matrix` |
 //! | a semidefinite program, minimise trace P subject to `P >= I, F <= -I` | the rest | `lmi` |
 //!
@@ -15,7 +16,7 @@ use certune_verify::{Inequality, LyapunovClaim, LyapunovRefusedClaim, LyapunovWi
 use nalgebra::DMatrix;
 
 use crate::common_matrix::common_matrix;
-use crate::equation::{balance, form, shared_solution, slowest_decay, solution};
+use crate::equation::{balance, form, own_solutions, shared_solution, slowest_decay, solution};
 use crate::lmi::{Affine, Program, SolveError};
 
 /// A linear loop, or the hull of several.
@@ -99,7 +100,10 @@ pub fn lyapunov(
             common_matrix(&scaled, regions).map(|p| vec![p])
         }
         (None, LyapunovMatrix::Common) => program(&scaled, regions, 1),
-        (None, LyapunovMatrix::Affine) => program(&scaled, regions, scaled.len()),
+        (None, LyapunovMatrix::Affine) => match own_solutions(&scaled, regions) {
+            Some(own) => Ok(own),
+            None => program(&scaled, regions, scaled.len()),
+        },
     };
     let triangle = |p: &DMatrix<f64>| -> Option<Vec<Number>> {
         let entries = (0..order).flat_map(|i| (i..order).map(move |j| (i, j)));
