@@ -18,7 +18,7 @@
 //! What the divisions leave over, `r = N - L L'`, is an integer matrix known without error. If `r_ii - n > sum_j |r_ij|` in each row then `r - n I` is positive
 //! definite (Gershgorin), so `2^2K D S D = L L' + (r - n I) + (f + n I)` is. How L was found does not enter. The k-th pivot of LDL' is the least of `x' S x` over x with
 //! `x_k = 1` and nothing after, where `|L'x|^2 >= l_kk^2`: each pivot of D S D is at least `2^-2K l_kk^2`. Off the diagonal `0 <= r_ij < l_jj < 2^(K+1)`, so the shift
-//! `(n + 1) 2^(K+1)` always suffices: definiteness by `n 2^-(K-2)` is recognised.
+//! `(n + 1) 2^(K+1)` always suffices: definiteness by about `n 2^-(K-2)` is recognised.
 //!
 //! | number | bound, enforced by comparison | bits |
 //! |---|---|---|
@@ -306,6 +306,30 @@ mod tests {
             if defect == 0 && exponent < 44 && tenths > 9 {
                 prop_assert!(by_remainder(&matrix).is_some());
             }
+        }
+
+        /// Whatever the order: `|y|^4 S - (y'S y + d) y y'` with `d >= 0` has `-d |y|^4` along y, in whole numbers, and no elimination is asked.
+        #[test]
+        fn a_direction_without_a_positive_value_is_never_overlooked(
+            order in 13_usize..48,
+            entries in prop::collection::vec(-9_i64..9, 48),
+            y in prop::collection::vec(-9_i64..9, 48),
+            lowered in 0_u8..2,
+            sizes in prop::collection::vec(0_u32..40, 48),
+        ) {
+            let y: Vec<BigInt> = y[..order].iter().map(|&x| x.into()).collect();
+            // Positive definite: the identity and a product of a vector with itself.
+            let start = |i: usize, j: usize| BigInt::from(entries[i] * entries[j] + i64::from(i == j));
+            let along = (0..order).flat_map(|i| (0..order).map(move |j| (i, j)));
+            let value = along.map(|(i, j)| &y[i] * &y[j] * start(i, j)).sum::<BigInt>() + lowered;
+            let square: BigInt = y.iter().map(|y| y * y).sum();
+            let matrix: Integers = (0..order)
+                .map(|i| {
+                    let entry = |j: usize| &square * &square * start(i, j) - &value * &y[i] * &y[j];
+                    (0..order).map(|j| entry(j) << (sizes[i] + sizes[j])).collect()
+                })
+                .collect();
+            prop_assert!(by_remainder(&matrix).is_none() && by_minors(&matrix).is_none());
         }
 
         /// One entry moved: a definite matrix that stops being one is noticed.

@@ -252,6 +252,17 @@ mod tests {
         fn a_dyadic_is_the_float_itself(x in any::<f64>().prop_filter("finite", |x| x.is_finite())) {
             let n = Number::dyadic(x).unwrap();
             prop_assert_eq!(n.value().clone(), BigRational::from_float(x).unwrap());
+            prop_assert_eq!(n.to_string().parse::<Number>().unwrap(), n);
+        }
+
+        #[test]
+        fn a_dyadic_is_in_lowest_terms(mantissa in any::<i64>(), twos in 0_u32..40, power in -1100_i32..1100) {
+            let mantissa = mantissa >> twos << twos;
+            let n = format!("{mantissa}p{power}").parse::<Number>().unwrap();
+            let two = BigRational::from_integer(2.into());
+            let expected = BigRational::from_integer(mantissa.into()) * two.pow(power);
+            // Equality alone would cancel first.
+            prop_assert_eq!((n.value().numer(), n.value().denom()), (expected.numer(), expected.denom()));
         }
 
         #[test]
