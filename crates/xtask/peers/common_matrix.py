@@ -1,9 +1,9 @@
 """One Lyapunov matrix for several loops, by cvxpy and Clarabel: seconds of CPU time.
 
-    common_matrix.py FILE   prints `common-matrix CPU_S SOLVER_S`, all of cvxpy's call and Clarabel's own part of it
+    common_matrix.py FILE   prints `common-matrix CPU_S`, all of cvxpy's work and Clarabel's, which is nearly all of it
 
-FILE holds the rate, the number of matrices and their order, then their rows. The program: minimise tr P subject to P >= I and
-A'P + P A + 2 rate P <= -margin I for each A. The states are first brought to like sizes by powers of two, as ours are; that is not timed.
+FILE holds the rate, the number of matrices and their order, then their rows. The program: P >= I and
+A'P + P A + 2 rate P <= -margin I for each A, with nothing to minimise, which is quicker than the least trace. The states are first brought to like sizes by powers of two, as ours are; that is not timed.
 One thread, as ours. A matrix that does not serve is no figure.
 """
 
@@ -33,7 +33,7 @@ def main():
     constraints = [p >> one]
     for a in loops:
         constraints.append(a.T @ p + p @ a + 2 * rate * p << -1e-3 * np.linalg.norm(a) * one)
-    problem = cp.Problem(cp.Minimize(cp.trace(p)), constraints)
+    problem = cp.Problem(cp.Minimize(0), constraints)
     start = time.process_time()
     problem.solve(solver=cp.CLARABEL, max_threads=1)
     spent = time.process_time() - start
@@ -42,7 +42,7 @@ def main():
     definite = [found] + [-(a.T @ found + found @ a + 2 * rate * found) for a in loops]
     if problem.status != cp.OPTIMAL or min(np.linalg.eigvalsh(m).min() for m in definite) <= 0:
         sys.exit(f"no common matrix: {problem.status}")
-    print(f"common-matrix {spent:.3f} {problem.solver_stats.solve_time:.3f}")
+    print(f"common-matrix {spent:.3f}")
 
 
 main()
