@@ -171,7 +171,11 @@ fn measure(work: &str, count: usize) -> Outcome<f64> {
         }
         "fastest-decay" => {
             let loops = loops(count)?;
-            Ok(1e3 * mean_cpu_s(count, |k| Ok(drop(black_box(fastest_decay(&loops[k], common)?))))?)
+            let fastest = |k: usize| {
+                black_box(fastest_decay(&loops[k], common)?);
+                Ok(())
+            };
+            Ok(1e3 * mean_cpu_s(count, fastest)?)
         }
         "region" => {
             let (problem, options) = (problem()?, RegionOptions::default());
