@@ -18,14 +18,18 @@
 //! | `sampled_region` | the same of the sampled nonlinear loop |
 //! | `adaptive` | convergence, the frozen loop and the sampled velocity loop of the adaptive controller |
 //! | `lyapunov` | Lyapunov matrices of any linear loop or polytope of loops |
+//! | `equation` | the Lyapunov equation of one matrix |
+//! | `common_matrix` | one Lyapunov matrix for large matrices, by Newton's method |
 //! | `lmi` | linear matrix inequalities for clarabel |
 //!
 //! Plants and controllers are unknown here: they arrive as numbers, so the same code certifies textbook loops.
 #![forbid(unsafe_code)]
 
 mod adaptive;
+mod common_matrix;
 mod digits;
 mod disturbance;
+mod equation;
 mod exponential;
 mod joint_region;
 mod lmi;

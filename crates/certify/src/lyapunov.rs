@@ -1,20 +1,22 @@
 //! Lyapunov matrices for linear loops and polytopes of loops.
 //!
 //! Statement and inequalities as in `certune_verify`'s `lyapunov`. States are first balanced by powers of two (Osborne), `A -> T^-1 A T`, `P -> T^-1 P T^-1`.
-//! One matrix and one half plane: the Lyapunov equation `(A + rate)'P + P(A + rate) = -I` by the doubling iteration of its Cayley transform,
+//! Looked for in turn:
 //!
-//! ```text
-//! P_0 = 2p (pI - A)^-T (pI - A)^-1,  E_0 = (pI + A)(pI - A)^-1,   P_(k+1) = P_k + E_k'P_k E_k,   E_(k+1) = E_k^2,
-//! ```
+//! | what | of which family | file |
+//! |---|---|---|
+//! | the solution of one Lyapunov equation | one matrix and one half plane or disk: always there; any other: where one serves all | `equation` |
+//! | the solutions of the vertices' equations, interpolated | where a matrix for each vertex is asked for and they serve | `equation` |
+//! | a common matrix, by Newton's method | order above 12 | `common_matrix` |
+//! | a semidefinite program, minimise trace P subject to `P >= I, F <= -I` | the rest | `lmi` |
 //!
-//! about 20 products of order n; a disk about 0 starts from `P_0 = I, E_0 = A/radius`. Everything else is a semidefinite program, minimise trace P subject to
-//! `P >= I, F <= -I`, quick up to order 10 or so. What comes out is rounded to dyadics and decided by the checker.
-//!
-//! Source: R. A. Smith, "Matrix equation XA + BX = C", SIAM J. Appl. Math. 16 (1968), for the doubling.
+//! What comes out is rounded to dyadics and decided by the checker.
 
 use certune_verify::{Inequality, LyapunovClaim, LyapunovRefusedClaim, LyapunovWitness, Number, PlaneRegion, Polytope};
 use nalgebra::DMatrix;
 
+use crate::common_matrix::common_matrix;
+use crate::equation::{balance, form, own_solutions, shared_solution, slowest_decay, solution};
 use crate::lmi::{Affine, Program, SolveError};
 
 /// A linear loop, or the hull of several.
@@ -24,6 +26,15 @@ pub struct LinearFamily {
     pub vertices: Vec<DMatrix<f64>>,
     /// The configuration whose linearised loop it is, rad; for the words of the claim.
     pub configuration_rad: Option<Vec<f64>>,
+}
+
+impl LinearFamily {
+    /// The common order of the matrices, if they are square, finite and of one.
+    fn order(&self) -> Option<usize> {
+        let order = self.vertices.first().map(DMatrix::nrows).filter(|&order| order > 0)?;
+        let fits = |a: &DMatrix<f64>| a.nrows() == order && a.ncols() == order && a.iter().all(|x| x.is_finite());
+        self.vertices.iter().all(fits).then_some(order)
+    }
 }
 
 /// Which Lyapunov matrix is sought for a polytope.
@@ -53,6 +64,9 @@ pub enum LyapunovFailure {
     CandidateFailed,
 }
 
+/// A common matrix of a larger order comes from Newton's method in its own entries, not from a general program.
+const LARGEST_PROGRAM_ORDER: usize = 12;
+
 /// Points per vertex pair when an unstable matrix is looked for inside a polytope.
 const GRID: u32 = 16;
 
@@ -65,11 +79,7 @@ pub fn lyapunov(
     regions: &[PlaneRegion],
     matrix: LyapunovMatrix,
 ) -> Result<LyapunovClaim, LyapunovFailure> {
-    let order = family.vertices.first().map_or(0, DMatrix::nrows);
-    let square = |a: &DMatrix<f64>| a.nrows() == order && a.ncols() == order && a.iter().all(|x| x.is_finite());
-    if order == 0 || regions.is_empty() || !family.vertices.iter().all(square) {
-        return Err(LyapunovFailure::Matrices);
-    }
+    let order = family.order().filter(|_| !regions.is_empty()).ok_or(LyapunovFailure::Matrices)?;
     let polytope = polytope(&family.vertices).ok_or(LyapunovFailure::Matrices)?;
     let configuration_rad = match &family.configuration_rad {
         Some(q) => Some(q.iter().map(|&x| Number::decimal(x)).collect::<Option<_>>().ok_or(LyapunovFailure::Matrices)?),
@@ -86,8 +96,14 @@ pub fn lyapunov(
         .collect();
     let found = match (direct(&scaled, regions), matrix) {
         (Some(p), _) => Ok(vec![p]),
+        (None, LyapunovMatrix::Common) if order > LARGEST_PROGRAM_ORDER => {
+            common_matrix(&scaled, regions).map(|p| vec![p])
+        }
         (None, LyapunovMatrix::Common) => program(&scaled, regions, 1),
-        (None, LyapunovMatrix::Affine) => program(&scaled, regions, scaled.len()),
+        (None, LyapunovMatrix::Affine) => match own_solutions(&scaled, regions) {
+            Some(own) => Ok(own),
+            None => program(&scaled, regions, scaled.len()),
+        },
     };
     let triangle = |p: &DMatrix<f64>| -> Option<Vec<Number>> {
         let entries = (0..order).flat_map(|i| (i..order).map(move |j| (i, j)));
@@ -104,19 +120,51 @@ pub fn lyapunov(
     if claim.inequalities().is_ok_and(holds) { Ok(claim) } else { Err(LyapunovFailure::CandidateFailed) }
 }
 
-/// The fastest decay in steps of 1/1000 per s, up to 1000 per s, that [`lyapunov`] proves for the family, with its claim.
+/// The fastest decay in steps of 1/1000 per s, up to 1000 per s, that [`lyapunov`] proves for the family, with its claim: the next step is not proved.
+///
+/// The eigenvalues say where to look; from there the search gallops to the edge of what is proved and halves the rest. One matrix takes about four checks.
 ///
 /// # Errors
 /// As [`lyapunov`] for the rate 0.
 pub fn fastest_decay(family: &LinearFamily, matrix: LyapunovMatrix) -> Result<LyapunovClaim, LyapunovFailure> {
     const STEPS_PER_UNIT: u32 = 1000;
+    const END: u32 = 1000 * STEPS_PER_UNIT;
     let at = |steps: u32| {
         let text = format!("{}.{:03}", steps / STEPS_PER_UNIT, steps % STEPS_PER_UNIT);
         let rate_per_s = text.parse().unwrap_or_else(|_| Number::zero());
         lyapunov(family, &[PlaneRegion::HalfPlane { rate_per_s }], matrix)
     };
-    let mut best = at(0)?;
-    let (mut certified, mut refused) = (0, 1000 * STEPS_PER_UNIT);
+    let decay = family.order().and_then(|_| slowest_decay(&family.vertices)).unwrap_or(0.0);
+    let guess = (decay * f64::from(STEPS_PER_UNIT)).clamp(0.0, f64::from(END - 1)) as u32;
+    // A common matrix of several may stop far short of the slowest of their eigenvalues.
+    let mut stride = if family.vertices.len() == 1 { 1 } else { guess / 16 + 1 };
+    let (mut certified, mut refused, mut best) = match at(guess) {
+        Ok(claim) => {
+            let (mut certified, mut best) = (guess, claim);
+            let refused = loop {
+                let next = certified.saturating_add(stride).min(END);
+                match if next < END { at(next) } else { break END } {
+                    Ok(claim) => (certified, best) = (next, claim),
+                    Err(_) => break next,
+                }
+                stride = stride.saturating_mul(2);
+            };
+            (certified, refused, best)
+        }
+        Err(failure) if guess == 0 => return Err(failure),
+        Err(_) => {
+            let mut refused = guess;
+            loop {
+                let next = refused.saturating_sub(stride);
+                match at(next) {
+                    Ok(claim) => break (next, refused, claim),
+                    Err(failure) if next == 0 => return Err(failure),
+                    Err(_) => refused = next,
+                }
+                stride = stride.saturating_mul(2);
+            }
+        }
+    };
     while refused - certified > 1 {
         let middle = certified.midpoint(refused);
         match at(middle) {
@@ -137,6 +185,9 @@ fn polytope(vertices: &[DMatrix<f64>]) -> Option<Polytope> {
 /// A matrix of the polytope with an eigenvalue outside: the vertices, then points between two of them.
 fn refusal(polytope: &Polytope, regions: &[PlaneRegion]) -> Option<LyapunovRefusedClaim> {
     let count = polytope.vertices.len();
+    if polytope.vertices[0].len() > LyapunovRefusedClaim::LARGEST_ORDER {
+        return None;
+    }
     let pairs = (0..count).flat_map(|i| (i..count).map(move |j| (i, j)));
     let points = pairs.flat_map(|(i, j)| (0..if i == j { 1 } else { GRID }).map(move |step| (i, j, step)));
     for (i, j, step) in points {
@@ -156,79 +207,12 @@ fn refusal(polytope: &Polytope, regions: &[PlaneRegion]) -> Option<LyapunovRefus
     None
 }
 
-/// Powers of two that bring the rows and columns of `sum |A_k|` to equal size.
-fn balance(vertices: &[DMatrix<f64>]) -> Vec<f64> {
-    let order = vertices[0].nrows();
-    let size = vertices.iter().fold(DMatrix::zeros(order, order), |sum, a| sum + a.abs());
-    let mut scale = vec![1.0_f64; order];
-    for _ in 0..20 {
-        for k in 0..order {
-            let others = (0..order).filter(|&i| i != k);
-            let row: f64 = others.clone().map(|j| size[(k, j)] * scale[j] / scale[k]).sum();
-            let column: f64 = others.map(|i| size[(i, k)] * scale[k] / scale[i]).sum();
-            if row > 0.0 && column > 0.0 {
-                scale[k] *= (0.5 * (row / column).log2()).round().clamp(-20.0, 20.0).exp2();
-            }
-        }
-    }
-    scale
-}
-
-/// The Lyapunov equation of a single matrix in a half plane, or in a disk about 0.
+/// Without a program: the Lyapunov equation of a single matrix and region, or one whose solution serves all.
 fn direct(vertices: &[DMatrix<f64>], regions: &[PlaneRegion]) -> Option<DMatrix<f64>> {
-    let ([a], [region]) = (vertices, regions) else { return None };
-    let order = a.nrows();
-    let identity = DMatrix::<f64>::identity(order, order);
-    let (mut p, mut e) = match region {
-        PlaneRegion::HalfPlane { rate_per_s } => {
-            let shifted = a + &identity * rate_per_s.to_f64();
-            // Between the slowest and the fastest mode.
-            let slowest = shifted.clone().lu().try_inverse()?.norm().recip();
-            let pole = (slowest * shifted.norm()).sqrt();
-            let inverse = (&identity * pole - &shifted).try_inverse()?;
-            (inverse.transpose() * &inverse * (2.0 * pole), (&identity * pole + &shifted) * &inverse)
-        }
-        PlaneRegion::Disk { centre, radius } => {
-            if centre.to_f64().abs() > 0.0 {
-                return None;
-            }
-            (identity.clone(), a / radius.to_f64())
-        }
-        PlaneRegion::Sector { .. } => return None,
-    };
-    for _ in 0..60 {
-        let step = e.transpose() * &p * &e;
-        let done = step.norm() <= 1e-17 * p.norm();
-        p += step;
-        p = (&p + p.transpose()) * 0.5;
-        e = &e * &e;
-        if done {
-            break;
-        }
-        if !p.iter().chain(e.iter()).all(|x| x.is_finite()) {
-            return None;
-        }
+    match (vertices, regions) {
+        ([a], [region @ (PlaneRegion::HalfPlane { .. } | PlaneRegion::Disk { .. })]) => solution(a, region),
+        _ => shared_solution(vertices, regions),
     }
-    Some(p)
-}
-
-/// `L (x) P + M (x) (P A) + M' (x) (A'P)`.
-fn form(region: &PlaneRegion, p: &DMatrix<f64>, a: &DMatrix<f64>) -> DMatrix<f64> {
-    let (l, m) = match region {
-        PlaneRegion::HalfPlane { rate_per_s } => {
-            (DMatrix::from_element(1, 1, 2.0 * rate_per_s.to_f64()), DMatrix::from_element(1, 1, 1.0))
-        }
-        PlaneRegion::Disk { centre, radius } => {
-            let (c, r) = (-centre.to_f64(), -radius.to_f64());
-            (DMatrix::from_row_slice(2, 2, &[r, c, c, r]), DMatrix::from_row_slice(2, 2, &[0.0, 1.0, 0.0, 0.0]))
-        }
-        PlaneRegion::Sector { slope } => {
-            let k = slope.to_f64();
-            (DMatrix::zeros(2, 2), DMatrix::from_row_slice(2, 2, &[k, 1.0, -1.0, k]))
-        }
-    };
-    let product = p * a;
-    l.kronecker(p) + m.kronecker(&product) + m.transpose().kronecker(&product.transpose())
 }
 
 /// `count` Lyapunov matrices by a semidefinite program: one for all vertices, or one for each.
@@ -276,4 +260,43 @@ fn program(vertices: &[DMatrix<f64>], regions: &[PlaneRegion], count: usize) -> 
     }
     let x = Program { cost, nonnegative: Vec::new(), blocks }.solve()?.x;
     Ok((0..count).map(|which| matrix(&x, which)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::equation::serves;
+    use proptest::prelude::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig { cases: 128, failure_persistence: None, ..ProptestConfig::default() })]
+        /// Two unlike methods: Newton's in the entries of P finds a common matrix where the general program does, and none where that finds none.
+        #[test]
+        fn newton_and_the_general_program_agree(
+            order in 1_usize..6,
+            seed in prop::collection::vec(-1.0..1.0_f64, 75),
+            spread in 0.0..2.0_f64,
+            which in 0_usize..4,
+        ) {
+            let number = |x: f64| Number::decimal(x).unwrap();
+            let half_plane = PlaneRegion::HalfPlane { rate_per_s: number(0.1) };
+            let regions = match which {
+                0 => vec![half_plane],
+                1 => vec![PlaneRegion::Disk { centre: number(-1.0), radius: number(2.5) }],
+                2 => vec![PlaneRegion::Sector { slope: number(1.5) }],
+                _ => vec![half_plane, PlaneRegion::Disk { centre: number(0.0), radius: number(4.0) }],
+            };
+            let vertex = |k: usize| DMatrix::from_fn(order, order, |i, j| {
+                seed[5 * i + j] + spread * seed[25 * k + 5 * i + j] - if i == j { 1.5 } else { 0.0 }
+            });
+            let vertices = [vertex(1), vertex(2)];
+            let newton = common_matrix(&vertices, &regions);
+            match program(&vertices, &regions, 1) {
+                // The program asks for a margin of a thousandth.
+                Ok(p) if serves(&p[0], &vertices, &regions) => prop_assert!(newton.is_ok(), "{newton:?}"),
+                Err(SolveError::Infeasible) => prop_assert!(newton.is_err()),
+                _ => {}
+            }
+        }
+    }
 }

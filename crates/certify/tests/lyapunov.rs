@@ -1,5 +1,5 @@
 //! Textbook loops and polytopes under the Lyapunov checker: what is stable is proved, what is not is refused with a matrix.
-#![expect(clippy::unwrap_used, reason = "test helpers")]
+#![expect(clippy::unwrap_used, clippy::panic, reason = "test helpers")]
 
 use certune_certify::{LinearFamily, LyapunovFailure, LyapunovMatrix, SolveError, fastest_decay, lyapunov};
 use certune_verify::{LyapunovClaim, LyapunovWitness, Number, PlaneRegion};
@@ -71,6 +71,71 @@ fn a_mass_on_a_spring_decays_at_its_own_rate() {
     }
     // All at once, with one P.
     assert!(holds(lyapunov(&loops, &[half_plane(0.9), sector(3.2), disk(0.0, 3.4)], LyapunovMatrix::Common)));
+}
+
+fn rate(claim: &LyapunovClaim) -> f64 {
+    let PlaneRegion::HalfPlane { rate_per_s } = &claim.regions[0] else { panic!("another region") };
+    rate_per_s.to_f64()
+}
+
+#[test]
+fn the_fastest_decay_is_an_edge_wherever_the_eigenvalues_send_the_search() {
+    // (s + 1)^4 in coordinates of unlike sizes: what double precision knows of P stops well before the eigenvalue.
+    let defective = DMatrix::from_fn(4, 4, |i, j| if i == j { -1.0 } else { f64::from(u16::from(j == i + 1)) * 1e3 });
+    // A common matrix stops short of the eigenvalues: -0.5 both, switching does worse.
+    let pair = vec![oscillator(1.0, 1.0, 1.0), oscillator(1.0, 1.0, 1.5)];
+    for (loops, at_least, at_most) in [
+        (family(vec![defective]), 0.7, 1.0),
+        (family(vec![oscillator(1.0, 2.0, 10.0)]), 0.999, 1.0),
+        (family(vec![square(&[-2000.0])]), 999.999, 1000.0),
+        (family(vec![square(&[-0.0005])]), 0.0, 0.0005),
+        (family(pair), 0.2, 0.5),
+    ] {
+        let claim = fastest_decay(&loops, LyapunovMatrix::Common).unwrap();
+        let found = rate(&claim);
+        assert!(claim.inequalities().unwrap().iter().all(|i| i.smallest_pivot.is_some()), "{found} is not proved");
+        assert!((at_least..=at_most).contains(&found), "{found}");
+        // Halving the whole range, which knows nothing of eigenvalues, ends no higher: at the same step, or where double precision first loses P.
+        let (mut certified, mut refused) = (0_u32, 1_000_000);
+        while refused - certified > 1 {
+            let middle = certified.midpoint(refused);
+            let region = half_plane(f64::from(middle) / 1e3);
+            if holds(lyapunov(&loops, &[region], LyapunovMatrix::Common)) {
+                certified = middle
+            } else {
+                refused = middle
+            }
+        }
+        let halved = f64::from(certified) / 1e3;
+        assert!(found > halved - 1e-9 && (loops.vertices[0].nrows() == 4 || found < halved + 1e-9), "{found} {halved}");
+    }
+    let unstable = fastest_decay(&family(vec![square(&[0.5])]), LyapunovMatrix::Common);
+    assert!(matches!(unstable, Err(LyapunovFailure::Refused(_))));
+    let unfit = fastest_decay(&family(vec![square(&[f64::NAN])]), LyapunovMatrix::Common);
+    assert_eq!(unfit, Err(LyapunovFailure::Matrices));
+}
+
+#[test]
+fn a_large_polytope_has_a_common_matrix_or_none() {
+    // Seven oscillators turned into each other, so that nothing is block diagonal.
+    let loops = |stiffness: f64| {
+        let mut a = DMatrix::zeros(14, 14);
+        for k in 0..7 {
+            let damping = 0.4 + 0.1 * k as f64;
+            a.view_mut((2 * k, 2 * k), (2, 2)).copy_from(&oscillator(1.0, damping, stiffness));
+        }
+        let v = DMatrix::from_fn(14, 1, |i, _| 1.0 + 0.1 * i as f64);
+        let turn = DMatrix::identity(14, 14) - &v * v.transpose() * (2.0 / v.norm_squared());
+        &turn * a * &turn
+    };
+    let polytope = |stiffness: f64| family(vec![loops(1.0), loops(stiffness)]);
+    assert!(holds(lyapunov(&polytope(1.3), &[half_plane(0.0)], LyapunovMatrix::Common)));
+    assert!(holds(lyapunov(&polytope(1.3), &[half_plane(0.05), disk(0.0, 1.5)], LyapunovMatrix::Common)));
+    // As for one oscillator: switching between 1 and 10 pumps it up.
+    assert_eq!(
+        lyapunov(&polytope(10.0), &[half_plane(0.0)], LyapunovMatrix::Common),
+        Err(LyapunovFailure::NotFound(SolveError::Infeasible))
+    );
 }
 
 #[test]

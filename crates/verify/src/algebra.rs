@@ -50,58 +50,6 @@ pub(crate) fn positive_definite_pivots(matrix: &Matrix) -> Option<Vec<BigRationa
     Some(pivots)
 }
 
-/// As [`positive_definite_pivots`] for large matrices: pivots of an equilibrated matrix that is smaller by a rounding.
-///
-/// With powers of two `d_i`, `d_i d_j a_ij = 2^-BITS (n_ij + f_ij)`, `n_ij` whole and `0 <= f_ij < 1`. A symmetric matrix with entries in [0, 1) is at least
-/// `-n I`, so it is enough that the integers `n_ij`, less the order on the diagonal, are positive definite: Bareiss, whose pivots are the leading minors. A matrix
-/// that is definite by less than about `n 2^-BITS` is not recognised.
-pub(crate) fn positive_definite_rounded(matrix: &Matrix) -> Option<Vec<BigRational>> {
-    const BITS: i64 = 64;
-    let order = matrix.len();
-    let symmetric =
-        matrix.iter().all(|row| row.len() == order) && (0..order).all(|i| (0..i).all(|j| matrix[i][j] == matrix[j][i]));
-    if order == 0 || !symmetric || !(0..order).all(|i| matrix[i][i].is_positive()) {
-        return None;
-    }
-    // Half the binary exponent of the diagonal.
-    let size =
-        |x: &BigRational| i64::try_from(x.numer().bits()).unwrap_or(0) - i64::try_from(x.denom().bits()).unwrap_or(0);
-    let half: Vec<i64> = (0..order).map(|i| size(&matrix[i][i]).div_euclid(2)).collect();
-    let mut whole = vec![vec![BigInt::zero(); order]; order];
-    for i in 0..order {
-        for j in 0..order {
-            let (entry, shift) = (&matrix[i][j], BITS - half[i] - half[j]);
-            let power = shift.unsigned_abs();
-            let (numerator, denominator) = if shift >= 0 {
-                (entry.numer() << power, entry.denom().clone())
-            } else {
-                (entry.numer().clone(), entry.denom() << power)
-            };
-            whole[i][j] = numerator.div_floor(&denominator);
-        }
-        whole[i][i] -= BigInt::from(order);
-    }
-    let unit = BigInt::one() << BITS.unsigned_abs();
-    let mut previous = BigInt::one();
-    let mut pivots = Vec::with_capacity(order);
-    for k in 0..order {
-        let pivot = whole[k][k].clone();
-        if !pivot.is_positive() {
-            return None;
-        }
-        for i in k + 1..order {
-            for j in i..order {
-                let entry = (&pivot * &whole[i][j] - &whole[i][k] * &whole[k][j]) / &previous;
-                whole[j][i].clone_from(&entry);
-                whole[i][j] = entry;
-            }
-        }
-        pivots.push(BigRational::new(pivot.clone(), &previous * &unit));
-        previous = pivot;
-    }
-    Some(pivots)
-}
-
 /// `det(s I - A)`, coefficients from the highest power down, the first being 1.
 pub(crate) fn characteristic_polynomial(a: &Matrix) -> Vec<BigRational> {
     resolvent(a).0

@@ -11,6 +11,7 @@
 //! | `quantity` | what a number must be before anything is derived from it |
 //! | `outward` | square roots and exponentials rounded to the safe side |
 //! | `algebra` | characteristic polynomial, Hurwitz determinants, LDL' |
+//! | `definite` | definiteness of large matrices, by integers |
 //! | `polytope` | whether every polynomial of a box of them is stable |
 //! | `sampled_loops` | the polynomials of the loops with a sampled controller and a delayed torque |
 //! | `form` | quadratic forms assembled from linear ones |
@@ -30,6 +31,7 @@ mod aic;
 mod algebra;
 mod check;
 mod claims;
+mod definite;
 mod document;
 mod error;
 mod form;

@@ -10,6 +10,7 @@ use core::str::FromStr;
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
+use num_traits::float::FloatCore;
 use num_traits::{One, Pow, ToPrimitive, Zero};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -49,10 +50,14 @@ impl Number {
 
     /// `x` itself, as a dyadic rational. `None` unless `x` is finite.
     pub fn dyadic(x: f64) -> Option<Self> {
-        let exact = BigRational::from_float(x)?;
-        let twos = exact.numer().trailing_zeros().unwrap_or(0);
-        let power = i128::from(twos) - i128::from(exact.denom().bits() - 1);
-        format!("{}p{power}", exact.numer() >> twos).parse().ok()
+        if !x.is_finite() {
+            return None;
+        }
+        let (mantissa, exponent, sign) = x.integer_decode();
+        let twos = mantissa.trailing_zeros().min(63);
+        let mantissa = i64::try_from(mantissa >> twos).ok()? * i64::from(sign);
+        let power = if mantissa == 0 { 0 } else { i32::from(exponent) + i32::try_from(twos).ok()? };
+        Some(Self { text: format!("{mantissa}p{power}"), value: scaled_by_twos(mantissa.into(), power) })
     }
 
     /// The decimal of a rational. `None` when it has none that fits a certificate.
@@ -134,9 +139,20 @@ fn exponent(text: &str, most: i32) -> Option<i32> {
     (e.unsigned_abs() <= most.unsigned_abs()).then_some(e)
 }
 
-fn scaled(mantissa: BigInt, base: u32, exponent: i32) -> BigRational {
-    let power = Pow::pow(BigInt::from(base), exponent.unsigned_abs());
+fn scaled_by_tens(mantissa: BigInt, exponent: i32) -> BigRational {
+    let power = Pow::pow(BigInt::from(10), exponent.unsigned_abs());
     if exponent >= 0 { BigRational::from_integer(mantissa * power) } else { BigRational::new(mantissa, power) }
+}
+
+/// `mantissa * 2^exponent` without a search for common factors, which can only be twos.
+fn scaled_by_twos(mantissa: BigInt, exponent: i32) -> BigRational {
+    if exponent >= 0 {
+        return BigRational::from_integer(mantissa << exponent.unsigned_abs());
+    }
+    let common = mantissa
+        .trailing_zeros()
+        .map_or(exponent.unsigned_abs(), |twos| exponent.unsigned_abs().min(u32::try_from(twos).unwrap_or(u32::MAX)));
+    BigRational::new_raw(mantissa >> common, BigInt::one() << (exponent.unsigned_abs() - common))
 }
 
 fn parse(text: &str) -> Option<BigRational> {
@@ -144,7 +160,7 @@ fn parse(text: &str) -> Option<BigRational> {
         return None;
     }
     if let Some((mantissa, power)) = text.split_once('p') {
-        return Some(scaled(integer(mantissa)?, 2, exponent(power, MAX_DYADIC_EXPONENT)?));
+        return Some(scaled_by_twos(integer(mantissa)?, exponent(power, MAX_DYADIC_EXPONENT)?));
     }
     let (mantissa, power) = match text.split_once('e') {
         Some((mantissa, power)) => (mantissa, exponent(power, MAX_DECIMAL_EXPONENT)?),
@@ -162,7 +178,7 @@ fn parse(text: &str) -> Option<BigRational> {
     if significant > MAX_DIGITS || (digits.is_zero() && text.starts_with('-')) {
         return None;
     }
-    Some(scaled(digits, 10, power - i32::try_from(fraction.len()).ok()?))
+    Some(scaled_by_tens(digits, power - i32::try_from(fraction.len()).ok()?))
 }
 
 impl FromStr for Number {
@@ -236,6 +252,17 @@ mod tests {
         fn a_dyadic_is_the_float_itself(x in any::<f64>().prop_filter("finite", |x| x.is_finite())) {
             let n = Number::dyadic(x).unwrap();
             prop_assert_eq!(n.value().clone(), BigRational::from_float(x).unwrap());
+            prop_assert_eq!(n.to_string().parse::<Number>().unwrap(), n);
+        }
+
+        #[test]
+        fn a_dyadic_is_in_lowest_terms(mantissa in any::<i64>(), twos in 0_u32..40, power in -1100_i32..1100) {
+            let mantissa = mantissa >> twos << twos;
+            let n = format!("{mantissa}p{power}").parse::<Number>().unwrap();
+            let two = BigRational::from_integer(2.into());
+            let expected = BigRational::from_integer(mantissa.into()) * two.pow(power);
+            // Equality alone would cancel first.
+            prop_assert_eq!((n.value().numer(), n.value().denom()), (expected.numer(), expected.denom()));
         }
 
         #[test]

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `cargo xtask ci` | every check, in the order in which a failure is cheapest to learn |
 //! | `cargo xtask golden` | writes the golden data again from Pinocchio (needs `pip install pin example-robot-data`) |
-//! | `cargo xtask peers` | sets up Pinocchio and MuJoCo from PyPI, and measures them and ours in turn: one table |
+//! | `cargo xtask peers` | sets up Pinocchio, MuJoCo and cvxpy from PyPI, and measures them and ours in turn: tables |
 //! | `cargo xtask claims` | writes the certificates in `proofs/certificates/` again, and the list of them in `proofs/README.md` |
 #![forbid(unsafe_code)]
 

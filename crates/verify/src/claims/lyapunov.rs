@@ -1,20 +1,6 @@
 //! Claim `lyapunov`: every matrix of a polytope has its eigenvalues in a region of the plane.
 //!
-//! A region is the set of z with `L + z M + conj(z) M' < 0` for real L = L', M. If P > 0 and, with (x) the Kronecker product,
-//!
-//! ```text
-//! F(P, A) = L (x) P + M (x) (P A) + M' (x) (A'P) < 0
-//! ```
-//!
-//! then an eigenpair `A v = z v` gives `(I (x) v)* F (I (x) v) = (v*Pv)(L + z M + conj(z) M') < 0`: z lies in the region.
-//!
-//! | region | L | M |
-//! |---|---|---|
-//! | half plane `Re z < -rate` | 2 rate | 1 |
-//! | disk `\|z - centre\| < radius` | `[[-radius, -centre], [., -radius]]` | `[[0, 1], [0, 0]]` |
-//! | sector `\|Im z\| < slope \|Re z\|, Re z < 0` | 0 | `[[slope, 1], [-1, slope]]` |
-//!
-//! F is linear in A: one P that passes at the vertices passes on their hull, even when the matrix moves in it with time (half plane, disk about 0). One P for
+//! By the inequality `F(P, A) < 0` of the region ([`PlaneRegion`]) and `P > 0`. F is linear in A: one P that passes at the vertices passes on their hull, even when the matrix moves in it with time (half plane, disk about 0). One P for
 //! each vertex, `P(w) = sum w_i P_i` at `A(w) = sum w_i A_i`, passes if `F(P_i, A_i) < 0` and `F(P_i, A_j) + F(P_j, A_i) < 0`, for constant weights.
 //!
 //! Source: M. Chilali and P. Gahinet, "H-infinity design with pole placement constraints: an LMI approach", IEEE TAC 41(3), 1996. The
@@ -24,19 +10,19 @@ use num_rational::BigRational;
 use num_traits::{Signed, Zero};
 use serde::{Deserialize, Serialize};
 
+use super::plane_region::{PlaneRegion, WholeRegion, product};
 use super::{ClaimKind, Figure, Inequality, Provable, all_hold};
-use crate::algebra::{Matrix, characteristic_polynomial, common_integers, is_hurwitz, zeros};
+use crate::algebra::{characteristic_polynomial, common_integers, is_hurwitz, zeros};
+use crate::definite::{Integers, whole};
 use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::{Number, ratio};
-use crate::quantity::{require, require_at_least_zero, require_length, require_plain, require_positive};
+use crate::quantity::{require, require_at_least_zero, require_length, require_plain};
 use crate::statement::each;
 
 /// Vertices beyond this make more matrices than anyone wants to wait for.
 const MOST_VERTICES: usize = 16;
 const LARGEST_ORDER: usize = 64;
-/// A characteristic polynomial is computed exactly up to this order.
-const LARGEST_REFUSED_ORDER: usize = 12;
 
 /// The hull of some matrices.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,29 +30,6 @@ const LARGEST_REFUSED_ORDER: usize = 12;
 pub struct Polytope {
     /// Square matrices of one order, row by row.
     pub vertices: Vec<Vec<Vec<Number>>>,
-}
-
-/// A part of the complex plane.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum PlaneRegion {
-    /// `Re z < -rate`.
-    HalfPlane {
-        /// 1/s, at least 0.
-        rate_per_s: Number,
-    },
-    /// `|z - centre| < radius`.
-    Disk {
-        /// On the real axis.
-        centre: Number,
-        /// Positive.
-        radius: Number,
-    },
-    /// `|Im z| < slope |Re z|` and `Re z < 0`.
-    Sector {
-        /// Tangent of the half angle, positive.
-        slope: Number,
-    },
 }
 
 /// The Lyapunov matrix: upper triangles, row by row.
@@ -112,11 +75,11 @@ pub struct LyapunovRefusedClaim {
 }
 
 impl Polytope {
-    /// The matrices as rationals.
+    /// Rows of the matrices.
     ///
     /// # Errors
     /// [`Flaw`] unless there is at least one, all are square and of one order, within the limits.
-    fn matrices(&self) -> Result<Vec<Matrix>, Flaw> {
+    fn values(&self) -> Result<Vec<Vec<Vec<&BigRational>>>, Flaw> {
         let order = self.vertices.first().map_or(0, Vec::len);
         if order == 0 || order > LARGEST_ORDER || self.vertices.len() > MOST_VERTICES {
             return Err(Flaw::NotCovered { what: "a polytope without matrices, or with too many or too large ones" });
@@ -127,8 +90,11 @@ impl Polytope {
                 require_length("vertices", row.len(), order)?;
             }
         }
-        let row = |row: &Vec<Number>| row.iter().map(|x| x.value().clone()).collect();
-        Ok(self.vertices.iter().map(|vertex| vertex.iter().map(row).collect()).collect())
+        Ok(self
+            .vertices
+            .iter()
+            .map(|vertex| vertex.iter().map(|row| row.iter().map(Number::value).collect()).collect())
+            .collect())
     }
 
     fn in_words(&self) -> String {
@@ -140,86 +106,21 @@ impl Polytope {
     }
 }
 
-impl PlaneRegion {
-    fn check(&self) -> Result<(), Flaw> {
-        match self {
-            Self::HalfPlane { rate_per_s } => require_at_least_zero("rate_per_s", rate_per_s),
-            Self::Disk { centre, radius } => {
-                require_plain("centre", centre)?;
-                require_positive("radius", radius)
-            }
-            Self::Sector { slope } => require_positive("slope", slope),
-        }
-    }
-
-    fn in_words(&self) -> String {
-        match self {
-            Self::HalfPlane { rate_per_s } => format!("Re z < -{rate_per_s}"),
-            Self::Disk { centre, radius } => format!("|z - ({centre})| < {radius}"),
-            Self::Sector { slope } => format!("Re z < 0, |Im z| < {slope} |Re z|"),
-        }
-    }
-
-    /// L and M.
-    fn parts(&self) -> [Matrix; 2] {
-        let (zero, one) = (BigRational::zero, || ratio(1, 1));
-        match self {
-            Self::HalfPlane { rate_per_s } => [vec![vec![rate_per_s.value() * ratio(2, 1)]], vec![vec![one()]]],
-            Self::Disk { centre, radius } => {
-                let (c, r) = (-centre.value(), -radius.value());
-                [vec![vec![r.clone(), c.clone()], vec![c, r]], vec![vec![zero(), one()], vec![zero(), zero()]]]
-            }
-            Self::Sector { slope } => {
-                let k = || slope.value().clone();
-                [zeros(2), vec![vec![k(), one()], vec![-one(), k()]]]
-            }
-        }
-    }
-
-    /// `-F(P, A)`.
-    fn inequality(&self, p: &Matrix, a: &Matrix) -> Matrix {
-        let [l, m] = self.parts();
-        let n = p.len();
-        let mut product = zeros(n);
-        for i in 0..n {
-            for k in 0..n {
-                if !p[i][k].is_zero() {
-                    for j in 0..n {
-                        product[i][j] += &p[i][k] * &a[k][j];
-                    }
-                }
-            }
-        }
-        let mut form = zeros(l.len() * n);
-        for (r, row) in l.iter().enumerate() {
-            for (c, weight) in row.iter().enumerate() {
-                for i in 0..n {
-                    for j in 0..n {
-                        let entry = weight * &p[i][j] + &m[r][c] * &product[i][j] + &m[c][r] * &product[j][i];
-                        form[r * n + i][c * n + j] = -entry;
-                    }
-                }
-            }
-        }
-        form
-    }
-}
-
-fn sum(a: &Matrix, b: &Matrix) -> Matrix {
-    a.iter().zip(b).map(|(a, b)| a.iter().zip(b).map(|(a, b)| a + b).collect()).collect()
-}
-
-fn symmetric(order: usize, triangle: &[Number]) -> Result<Matrix, Flaw> {
+/// A symmetric matrix by its upper triangle.
+fn symmetric(order: usize, triangle: &[Number]) -> Result<Vec<Vec<&BigRational>>, Flaw> {
     require_length("p", triangle.len(), order * (order + 1) / 2)?;
-    let mut matrix = zeros(order);
-    let mut entries = triangle.iter();
-    for (i, j) in (0..order).flat_map(|i| (i..order).map(move |j| (i, j))) {
-        if let Some(entry) = entries.next() {
-            matrix[i][j].clone_from(entry.value());
-            matrix[j][i].clone_from(entry.value());
-        }
+    let entry = |i: usize, j: usize| {
+        let (first, second) = (i.min(j), i.max(j));
+        triangle[first * (2 * order + 1 - first) / 2 + second - first].value()
+    };
+    Ok((0..order).map(|i| (0..order).map(|j| entry(i, j)).collect()).collect())
+}
+
+fn sum(mut a: Integers, b: &Integers) -> Integers {
+    for (a, b) in a.iter_mut().flatten().zip(b.iter().flatten()) {
+        *a += b;
     }
-    Ok(matrix)
+    a
 }
 
 impl LyapunovClaim {
@@ -228,36 +129,52 @@ impl LyapunovClaim {
     /// # Errors
     /// [`Flaw`] when the matrices do not fit together or a region is none.
     pub fn inequalities(&self) -> Result<Vec<Inequality>, Flaw> {
-        let matrices = self.polytope.matrices()?;
-        let order = matrices[0].len();
+        let vertices = self.polytope.values()?;
+        let order = vertices[0].len();
         if self.regions.is_empty() {
             return Err(Flaw::NotCovered { what: "a claim without a region" });
         }
         for region in &self.regions {
             region.check()?;
         }
+        let p = match &self.witness {
+            LyapunovWitness::Common { p } => vec![symmetric(order, p)?],
+            LyapunovWitness::Affine { p } => {
+                require_length("p", p.len(), vertices.len())?;
+                p.iter().map(|p| symmetric(order, p)).collect::<Result<_, _>>()?
+            }
+        };
+        let ((a, a_unit), (p, p_unit)) = (whole(&vertices), whole(&p));
+        let regions: Vec<(String, WholeRegion)> =
+            self.regions.iter().map(|region| (region.in_words(), WholeRegion::new(region))).collect();
+        let form = |region: &WholeRegion, p: &Integers, a: &Integers| region.inequality(p, &a_unit, &product(p, a));
+        let unit = |region: &WholeRegion| &region.unit * &a_unit * &p_unit;
         let mut all = Vec::new();
-        let mut decide = |name: String, matrix: &Matrix| all.push(Inequality::decide_large(name, matrix));
         match &self.witness {
-            LyapunovWitness::Common { p } => {
-                let p = symmetric(order, p)?;
-                decide("P".to_owned(), &p);
-                for (k, a) in matrices.iter().enumerate() {
-                    for region in &self.regions {
-                        decide(format!("{} at vertex {}", region.in_words(), k + 1), &region.inequality(&p, a));
+            LyapunovWitness::Common { .. } => {
+                all.push(Inequality::decide_whole("P".to_owned(), &p[0], &p_unit));
+                for (k, a) in a.iter().enumerate() {
+                    let product = product(&p[0], a);
+                    for (words, region) in &regions {
+                        let form = region.inequality(&p[0], &a_unit, &product);
+                        all.push(Inequality::decide_whole(
+                            format!("{words} at vertex {}", k + 1),
+                            &form,
+                            &unit(region),
+                        ));
                     }
                 }
             }
-            LyapunovWitness::Affine { p } => {
-                require_length("p", p.len(), matrices.len())?;
-                let p = p.iter().map(|p| symmetric(order, p)).collect::<Result<Vec<_>, _>>()?;
-                for (i, (p_i, a_i)) in p.iter().zip(&matrices).enumerate() {
-                    decide(format!("P {}", i + 1), p_i);
-                    for region in &self.regions {
-                        decide(format!("{} at vertex {}", region.in_words(), i + 1), &region.inequality(p_i, a_i));
-                        for (j, (p_j, a_j)) in p.iter().zip(&matrices).enumerate().skip(i + 1) {
-                            let mixed = sum(&region.inequality(p_i, a_j), &region.inequality(p_j, a_i));
-                            decide(format!("{} between vertices {} and {}", region.in_words(), i + 1, j + 1), &mixed);
+            LyapunovWitness::Affine { .. } => {
+                for (i, (p_i, a_i)) in p.iter().zip(&a).enumerate() {
+                    all.push(Inequality::decide_whole(format!("P {}", i + 1), p_i, &p_unit));
+                    for (words, region) in &regions {
+                        let (unit, own) = (unit(region), form(region, p_i, a_i));
+                        all.push(Inequality::decide_whole(format!("{words} at vertex {}", i + 1), &own, &unit));
+                        for (j, (p_j, a_j)) in p.iter().zip(&a).enumerate().skip(i + 1) {
+                            let mixed = sum(form(region, p_i, a_j), &form(region, p_j, a_i));
+                            let name = format!("{words} between vertices {} and {}", i + 1, j + 1);
+                            all.push(Inequality::decide_whole(name, &mixed, &unit));
                         }
                     }
                 }
@@ -317,31 +234,34 @@ impl Provable for LyapunovClaim {
 }
 
 impl LyapunovRefusedClaim {
+    /// A characteristic polynomial is computed exactly up to this order.
+    pub const LARGEST_ORDER: usize = 12;
+
     /// Checks that the matrix of the weights has an eigenvalue outside the open region.
     ///
     /// # Errors
     /// [`Flaw`] when it has none, or the region is a sector, or the matrix is too large for an exact characteristic polynomial.
     pub fn check(&self) -> Result<(), Flaw> {
-        let matrices = self.polytope.matrices()?;
-        let order = matrices[0].len();
+        let vertices = self.polytope.values()?;
+        let order = vertices[0].len();
+        if order > Self::LARGEST_ORDER {
+            return Err(Flaw::NotCovered { what: "a refusal of such a large matrix" });
+        }
         self.region.check()?;
-        require_length("weights", self.weights.len(), matrices.len())?;
+        require_length("weights", self.weights.len(), vertices.len())?;
         let mut total = BigRational::zero();
         let mut a = zeros(order);
-        for (weight, vertex) in self.weights.iter().zip(&matrices) {
+        for (weight, vertex) in self.weights.iter().zip(&vertices) {
             require_at_least_zero("weights", weight)?;
             total += weight.value();
             for i in 0..order {
                 for j in 0..order {
-                    a[i][j] += weight.value() * &vertex[i][j];
+                    a[i][j] += weight.value() * vertex[i][j];
                 }
             }
         }
         if let Some(last) = self.weights.last() {
             require("weights", last, total == ratio(1, 1), "weights with sum 1")?;
-        }
-        if order > LARGEST_REFUSED_ORDER {
-            return Err(Flaw::NotCovered { what: "a refusal of such a large matrix" });
         }
         let inside = match &self.region {
             PlaneRegion::HalfPlane { rate_per_s } => {

@@ -10,6 +10,7 @@ mod lyapunov;
 mod moving_goal;
 mod not_proved;
 mod pi_exponential;
+mod plane_region;
 mod refused;
 mod region;
 mod sampled;
@@ -17,10 +18,12 @@ mod sampled_motion;
 mod sampled_region;
 mod variation;
 
+use num_bigint::BigInt;
 use num_rational::BigRational;
 use serde::{Deserialize, Serialize};
 
-use crate::algebra::{Matrix, positive_definite_pivots, positive_definite_rounded};
+use crate::algebra::{Matrix, positive_definite_pivots};
+use crate::definite::{Integers, least_pivot};
 use crate::document::Document;
 use crate::error::Flaw;
 use crate::number::Number;
@@ -36,10 +39,11 @@ pub use exponential::{ExponentialClaim, LoopBox, LoopFamily, family_box};
 pub use joint_region::{
     CoveredSteps, JointProblem, JointRegionClaim, JointRegionWitness, JointWeights, joint_region_inequalities,
 };
-pub use lyapunov::{LyapunovClaim, LyapunovRefusedClaim, LyapunovWitness, PlaneRegion, Polytope};
+pub use lyapunov::{LyapunovClaim, LyapunovRefusedClaim, LyapunovWitness, Polytope};
 pub use moving_goal::{GoalList, ListedGoal, MovingGoalClaim, moving_goal_inequalities};
 pub use not_proved::{NotProvedClaim, Reason};
 pub use pi_exponential::{PiExponentialClaim, PiRefusedClaim, pi_inequalities};
+pub use plane_region::PlaneRegion;
 pub use refused::{Attained, BoxPoint, RefusedClaim};
 pub use region::{RegionClaim, RegionProblem, RegionWitness, region_inequalities};
 pub use sampled::{LoopTiming, SampledClaim};
@@ -240,7 +244,7 @@ pub struct Inequality {
     pub name: String,
     /// Order of the matrix.
     pub order: usize,
-    /// The smallest pivot of LDL', `None` when the matrix is not positive definite.
+    /// The smallest pivot of LDL' (of a large matrix: a number no larger, the diagonal scaled near 1), `None` when the matrix is not recognised as positive definite.
     pub smallest_pivot: Option<BigRational>,
 }
 
@@ -251,13 +255,15 @@ impl Inequality {
         Self { name, order: matrix.len(), smallest_pivot }
     }
 
-    /// The same for a matrix of any order: beyond [`LARGEST_EXACT_ORDER`] by the integers just below an equilibrated matrix.
-    pub(crate) fn decide_large(name: String, matrix: &Matrix) -> Self {
-        if matrix.len() <= LARGEST_EXACT_ORDER {
-            return Self::decide(name, matrix);
+    /// The same for `whole / unit`, `unit` positive, of any order: beyond [`LARGEST_EXACT_ORDER`] by integers, with a pivot of the matrix scaled to a diagonal near 1.
+    pub(crate) fn decide_whole(name: String, whole: &Integers, unit: &BigInt) -> Self {
+        let order = whole.len();
+        if order > LARGEST_EXACT_ORDER {
+            return Self { name, order, smallest_pivot: least_pivot(whole) };
         }
-        let smallest_pivot = positive_definite_rounded(matrix).and_then(|pivots| pivots.into_iter().min());
-        Self { name, order: matrix.len(), smallest_pivot }
+        let entry = |x: &BigInt| BigRational::new(x.clone(), unit.clone());
+        let matrix = whole.iter().map(|row| row.iter().map(entry).collect()).collect();
+        Self::decide(name, &matrix)
     }
 }
 

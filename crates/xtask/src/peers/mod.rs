@@ -7,6 +7,8 @@
 //! The column "of peak" is `operations / (ns * peak)`: the operations of a work are counted by a scalar that counts, the peak is what chains of multiply-adds in
 //! the machine's widest registers reach on one core in the same run.
 
+mod lyapunov;
+
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +19,7 @@ use crate::{Outcome, cargo, root, run};
 /// Rounds of ours and theirs in turn; odd, so that the median is one of them.
 const ROUNDS: usize = 9;
 
-const PACKAGES: [&str; 3] = ["pin==4.1.0", "cmeel-eigen==3.4.1", "mujoco==4.0.0"];
+const PACKAGES: [&str; 5] = ["pin==4.1.0", "cmeel-eigen==3.4.1", "mujoco==4.0.0", "cvxpy==1.9.3", "clarabel==0.11.1"];
 
 /// What is compared: the row's words, our work, whose program, its work, and the largest acceptable share of their time.
 const ROWS: [(&str, &str, Peer, &str, f64); 10] = [
@@ -99,17 +101,19 @@ pub fn peers() -> Outcome {
     let programs = set_up(&folder)?;
     same_arm(&programs)?;
     table(&programs)?;
-    lines(&programs)
+    lines(&programs)?;
+    lyapunov::table(&folder)
 }
 
 fn set_up(folder: &Path) -> Result<Programs, String> {
     let venv = folder.join("venv");
-    if !venv.join("ready").exists() {
+    // The mark names what is there: another list is fetched anew.
+    if fs::read_to_string(venv.join("ready")).ok().as_deref() != Some(&PACKAGES.join("\n")) {
         let mut make = Command::new("python3");
         make.args(["-m", "venv"]).arg(&venv);
         run("a Python environment for the peers", make)?;
-        let mut install = Command::new(venv.join("bin/pip"));
-        install.args(["install", "--quiet"]).args(PACKAGES);
+        let mut install = Command::new(venv.join("bin/python"));
+        install.args(["-m", "pip", "install", "--quiet", "--only-binary=:all:"]).args(PACKAGES);
         run("the peers from PyPI", install)?;
         fs::write(venv.join("ready"), PACKAGES.join("\n")).map_err(|e| e.to_string())?;
     }
@@ -149,7 +153,7 @@ fn set_up(folder: &Path) -> Result<Programs, String> {
     cxx.arg(sources.join("pinocchio.cpp")).arg("-o").arg(&pinocchio_program);
     compiled(&pinocchio_program, &sources.join("pinocchio.cpp"), "Pinocchio's program (minutes, 4 GB)", cxx)?;
 
-    let ours = bench()?;
+    let ours = bench("certune-closed-loop", "yardstick")?;
     let (model, mjcf) = (folder.join("panda.txt"), folder.join("panda.xml"));
     for (file, what) in [(&model, "model"), (&mjcf, "mjcf")] {
         fs::write(file, said(Command::new(&ours).arg(what))?).map_err(|e| format!("{}: {e}", file.display()))?;
@@ -166,10 +170,9 @@ fn compiled(program: &Path, source: &Path, title: &str, command: Command) -> Out
     }
 }
 
-/// The path of our bench, built.
-fn bench() -> Result<PathBuf, String> {
-    let words =
-        ["bench", "--package", "certune-closed-loop", "--bench", "yardstick", "--no-run", "--message-format=json"];
+/// The path of a bench of ours, built.
+fn bench(package: &str, name: &str) -> Result<PathBuf, String> {
+    let words = ["bench", "--package", package, "--bench", name, "--no-run", "--message-format=json"];
     let messages = said(cargo(&words).current_dir(root()))?;
     // One message a line; the last executable of that name is the bench.
     let executable = |line: &str| {
@@ -178,10 +181,10 @@ fn bench() -> Result<PathBuf, String> {
     };
     messages
         .lines()
-        .filter(|line| line.contains("\"name\":\"yardstick\""))
+        .filter(|line| line.contains(&format!("\"name\":\"{name}\"")))
         .filter_map(executable)
         .next_back()
-        .ok_or_else(|| "cargo named no executable for the yardstick".to_owned())
+        .ok_or_else(|| format!("cargo named no executable for {name}"))
 }
 
 /// What a program prints.
