@@ -25,7 +25,7 @@
 
 mod affine;
 
-use certune_dynamics::{Model, mass_matrix, mass_matrix_derivatives};
+use certune_dynamics::{Model, mass_matrix_as_described, mass_matrix_derivatives};
 use certune_linsys::{JointMatrix, Joints, Real};
 use num_traits::Zero;
 use rayon::prelude::*;
@@ -156,7 +156,7 @@ fn piece<const N: usize>(groups: &[Group<N>], q: &Joints<N, Affine<N>>) -> Piece
     let mut mass = JointMatrix::<N, Affine<N>>::zeros();
     let mut slopes = [JointMatrix::<N, Affine<N>>::zeros(); N];
     for (model, scale) in groups {
-        mass += mass_matrix(model, q).map(|x| x * *scale);
+        mass += mass_matrix_as_described(model, q).map(|x| x * *scale);
         for (sum, derivative) in slopes.iter_mut().zip(mass_matrix_derivatives(model, q)) {
             *sum += derivative.map(|x| x * *scale);
         }

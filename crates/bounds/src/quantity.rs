@@ -14,7 +14,7 @@
 //! Slopes along q at fixed directions and scales (the slope of a maximum is the slope of its maximiser) come from central differences of
 //! one evaluation on one compiled arm. Source: Dinkelbach, *On nonlinear fractional programming* (1967).
 
-use certune_dynamics::{Model, gravity_jacobian, gravity_torque, mass_matrix, mass_matrix_derivatives};
+use certune_dynamics::{Model, gravity_jacobian, gravity_torque, mass_matrix_as_described, mass_matrix_derivatives};
 use certune_linsys::{JointMatrix, Joints};
 
 use crate::arm_box::ArmBox;
@@ -177,7 +177,7 @@ impl<'a, const N: usize> Search<'a, N> {
     }
 
     fn inertia(&self, model: &Model<N>, q: &Joints<N>, rotor: &Joints<N>) -> JointMatrix<N> {
-        mass_matrix(model, q) + JointMatrix::from_diagonal(rotor)
+        mass_matrix_as_described(model, q) + JointMatrix::from_diagonal(rotor)
     }
 
     /// The weights of the parts at one end of every range.
@@ -236,7 +236,7 @@ impl<'a, const N: usize> Search<'a, N> {
         let local = Local {
             slopes: self.parts.iter().map(|part| mass_matrix_derivatives(&part.model, q)).collect(),
             masses: if relative {
-                self.parts.iter().map(|part| mass_matrix(&part.model, q)).collect()
+                self.parts.iter().map(|part| mass_matrix_as_described(&part.model, q)).collect()
             } else {
                 Vec::new()
             },

@@ -34,7 +34,8 @@ impl<const N: usize, T: Real> Base<N, T> {
             Self { rotation: [Matrix3::zeros(); N], origin: [Vector3::zeros(); N], axis: [Twist::zero(); N] };
         let mut rotation = Matrix3::identity();
         let mut origin = Vector3::zeros();
-        for (i, link) in model.links.iter().enumerate() {
+        for i in 0..N {
+            let link = &model.links[i];
             let (sin, cos) = q[i].sin_cos();
             origin += apply(&rotation, &link.position);
             rotation = turn_about_z(&product(&rotation, &link.rotation), sin, cos);

@@ -68,7 +68,7 @@ pub use friction::{COULOMB_SPEED_RAD_PER_S, friction_slope, friction_torque};
 pub use gravity::{gravity_jacobian, gravity_torque};
 pub use inverse::inverse_dynamics;
 pub use linearise::{Linearisation, TorqueDerivatives, inverse_dynamics_derivatives, linearise};
-pub use mass::mass_matrix;
+pub use mass::{mass_matrix, mass_matrix_as_described};
 pub use model::{LinkConstants, Model, State};
 pub use posture::Posture;
 pub use robot::{Frame, GRASP_BEYOND_FLANGE_M, GRAVITY_M_PER_S2, Inertia, JointLimits, Link, Payload, Robot};

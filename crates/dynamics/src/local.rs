@@ -257,4 +257,37 @@ impl<T: Real> Body<T> {
     pub(crate) fn of(body: &BodyInertia<T>) -> Self {
         Self { mass: body.mass, first_moment: V3::of(&body.first_moment), about_origin: body.about_origin }
     }
+
+    /// Both bodies as one.
+    #[inline(always)]
+    pub(crate) fn plus(&self, b: &Self) -> Self {
+        Self {
+            mass: self.mass + b.mass,
+            first_moment: self.first_moment + b.first_moment,
+            about_origin: sum(&self.about_origin, &b.about_origin),
+        }
+    }
+
+    /// In the parent's axes, about the parent's origin, from which this one's is reached by `p`.
+    ///
+    /// With `k = R h + (m/2) p`: `h' = R h + m p`, `I' = R I R' + 2 (p . k) 1 - p k' - k p'`.
+    #[inline(always)]
+    pub(crate) fn to_parent(self, passage: Passage<T>, p: &V3<T>) -> Self {
+        let (i, h) = (passage.symmetric_to_parent(&self.about_origin), passage.to_parent(&self.first_moment));
+        let k = p.scaled_plus(self.mass * T::from_f64(0.5), &h);
+        let (x, y, z) = (p.x * k.x, p.y * k.y, p.z * k.z);
+        let mixed = |a: T, b: T, from: T| from - a - b;
+        Self {
+            mass: self.mass,
+            first_moment: p.scaled_plus(self.mass, &h),
+            about_origin: Sym3 {
+                xx: i.xx + ((y + z) + (y + z)),
+                yy: i.yy + ((x + z) + (x + z)),
+                zz: i.zz + ((x + y) + (x + y)),
+                xy: mixed(p.x * k.y, p.y * k.x, i.xy),
+                xz: mixed(p.x * k.z, p.z * k.x, i.xz),
+                yz: mixed(p.y * k.z, p.z * k.y, i.yz),
+            },
+        }
+    }
 }

@@ -4,7 +4,7 @@ mod common;
 
 use certune_dynamics::{
     Frame, JointMatrix, Joints, Model, Payload, Robot, State, coriolis_matrix, coriolis_torque, gravity_jacobian,
-    gravity_torque, inverse_dynamics, mass_matrix, mass_matrix_derivatives,
+    gravity_torque, inverse_dynamics, mass_matrix, mass_matrix_as_described, mass_matrix_derivatives,
 };
 use common::{N, joints, robot, state};
 use proptest::prelude::*;
@@ -122,5 +122,15 @@ proptest! {
         q[1] -= twist;
         let (a, b) = (mass_matrix(&arm, &at.q), mass_matrix(&turned, &q));
         prop_assert!((a - b).amax() <= RTOL * (1.0 + a.amax()));
+    }
+}
+
+proptest! {
+    /// Two unlike algorithms: link frames from the tip, and scalar products in the base's axes.
+    #[test]
+    fn folded_and_described_frames_have_the_same_inertia(robot in robot(), at in state()) {
+        let arm = Model::<N>::new(&robot?)?;
+        let (folded, described) = (mass_matrix(&arm, &at.q), mass_matrix_as_described(&arm, &at.q));
+        prop_assert!((folded - described).norm() <= RTOL * described.norm(), "{folded} {described}");
     }
 }

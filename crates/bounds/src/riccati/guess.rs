@@ -4,7 +4,7 @@
 //! of the smallest eigenvalue over all sampled M. `d_i <- d_i exp(-eta (u_i² - p_i))` has as fixed points the d that are best
 //! for the objective: `p_i = 1/N` for the largest `sum log d_i`, `p_i ~ k_i²/d_i` for the least `sum k_i²/d_i`.
 
-use certune_dynamics::{Model, mass_matrix, mass_matrix_derivatives};
+use certune_dynamics::{Model, mass_matrix_as_described, mass_matrix_derivatives};
 use certune_linsys::{JointMatrix, Joints};
 
 use crate::eigen::symmetric_eigen;
@@ -42,7 +42,7 @@ fn least<const N: usize>(m: &JointMatrix<N>) -> f64 {
 
 /// Number `which` at a configuration: the inertia's negative for 0, the k of a joint otherwise.
 fn score<const N: usize>(model: &Model<N>, q: &Joints<N>, which: usize) -> f64 {
-    let m = mass_matrix(model, q);
+    let m = mass_matrix_as_described(model, q);
     if which == 0 { -least(&m) } else { relative(&m, &mass_matrix_derivatives(model, q)[which]) }
 }
 
@@ -70,7 +70,7 @@ impl<const N: usize> Guess<N> {
                 }
             }
             let q = place(&fractions);
-            let m = mass_matrix(model, &q);
+            let m = mass_matrix_as_described(model, &q);
             let derivatives = mass_matrix_derivatives(model, &q);
             for (which, list) in best.iter_mut().enumerate() {
                 let value = if which == 0 { -least(&m) } else { relative(&m, &derivatives[which]) };
@@ -112,7 +112,7 @@ impl<const N: usize> Guess<N> {
                 }
             }
         }
-        kept.push(mass_matrix(model, &lowest));
+        kept.push(mass_matrix_as_described(model, &lowest));
         let m_lo = -top[0];
         top[0] = 0.0;
         Self { m_lo, k: top, kept }

@@ -1,6 +1,8 @@
 //! The parts against direct computation, and the whole against sampling and climbing.
 
-use certune_dynamics::{Frame, Inertia, JointLimits, Link, Model, Robot, mass_matrix, mass_matrix_derivatives};
+use certune_dynamics::{
+    Frame, Inertia, JointLimits, Link, Model, Robot, mass_matrix_as_described, mass_matrix_derivatives,
+};
 use certune_linsys::{JointMatrix, Joints};
 
 use super::angle::{Arc, TRIG_ERROR, sine_cosine};
@@ -84,7 +86,7 @@ fn odd_arm<const N: usize>(draws: &mut Draws) -> Model<N> {
 
 /// The tested form as a matrix, by the recursions of another crate.
 fn direct<const N: usize>(model: &Model<N>, form: &Form<N>, q: &Joints<N>) -> JointMatrix<N> {
-    let m = mass_matrix(model, q);
+    let m = mass_matrix_as_described(model, q);
     match form {
         Form::Inertia(diagonal) => m - JointMatrix::from_diagonal(&Joints::from_column_slice(diagonal)),
         Form::Coriolis { joint, k, sign } => m + mass_matrix_derivatives(model, q)[*joint] * (-0.5 * sign / k),
@@ -216,7 +218,7 @@ fn agrees<const N: usize>(model: &Model<N>, arms: &ArmBox<N>, draws: &mut Draws,
     let mut positive = 0;
     for case in 0..boxes {
         let q = Joints::<N>::from_fn(|_, _| draws.within(-3.0, 3.0));
-        let m = mass_matrix(model, &q);
+        let m = mass_matrix_as_described(model, &q);
         let joint = 1 + case % (N - 1);
         let (truth, form): (f64, &dyn Fn(f64) -> Form<N>) = if case % 3 == 0 {
             (symmetric_eigen(&m).values.min(), &|x| Form::Inertia([x; N]))
@@ -286,7 +288,7 @@ fn use_of_bounds<const N: usize>(
     q: &Joints<N>,
     starts: &[Joints<N>],
 ) -> Vec<f64> {
-    let m = mass_matrix(model, q);
+    let m = mass_matrix_as_described(model, q);
     let d = mass_matrix_derivatives(model, q);
     let diagonal = Joints::<N>::from_column_slice(&bounds.diagonal_lower_kg_m2);
     let mut out = vec![

@@ -328,7 +328,7 @@ fn on_the_circle_the_entries_are_those_of_the_arm() {
     for index in 0..50 {
         let q = certune_linsys::Joints::<7>::from_iterator(sequence.point(index).map(|u| TAU * u - PI));
         let at: [[f64; 2]; 7] = std::array::from_fn(|j| [q[j].cos(), q[j].sin()]);
-        let inertia = certune_dynamics::mass_matrix(&model, &q);
+        let inertia = certune_dynamics::mass_matrix_as_described(&model, &q);
         let slopes = certune_dynamics::mass_matrix_derivatives(&model, &q);
         let stiffness = certune_dynamics::gravity_jacobian(&model, &q);
         let torque = certune_dynamics::gravity_torque(&model, &q);

@@ -2,7 +2,7 @@
 
 use certune_bounds::{ArmBox, SampledConstants, SearchOptions, maximise};
 use certune_certify::{ConstantValues, SampledConstantValues};
-use certune_dynamics::{Model, Robot, mass_matrix};
+use certune_dynamics::{Model, Robot, mass_matrix_as_described};
 use certune_linsys::{JointMatrix, Joints};
 use certune_verify::{Arm, ArmRanges, ConfigurationSet, Number, Record};
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -93,7 +93,7 @@ pub(super) fn sampled_diagonals<const N: usize>(
     let [rotor_lower, rotor_upper] = members.rotor_inertia_kg_m2();
     let lightest = members.model(&ends(0), &rotor_lower).ok()?;
     let heaviest = members.model(&ends(1), &rotor_upper).ok()?;
-    let inertia = |model: &Model<N>, at: &[f64]| mass_matrix(model, &Joints::from_column_slice(at));
+    let inertia = |model: &Model<N>, at: &[f64]| mass_matrix_as_described(model, &Joints::from_column_slice(at));
     let inverse = |at: &[f64]| inertia(&lightest, at).try_inverse();
     let options = SearchOptions {
         samples: found.samples,

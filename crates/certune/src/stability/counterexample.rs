@@ -4,7 +4,7 @@ use certune_bounds::{Axis, Member, SearchOptions, maximise};
 use certune_certify::UnstableLoop;
 use certune_closed_loop::{linearise_aic, linearise_aic_sampled};
 use certune_control::aic::{AicGains, AicParams};
-use certune_dynamics::{Model, gravity_jacobian, mass_matrix};
+use certune_dynamics::{Model, gravity_jacobian, mass_matrix_as_described};
 use certune_linsys::Joints;
 use certune_verify::{Attained, LoopTiming, Number, PlantStep};
 use nalgebra::{Complex, DMatrix, DVector};
@@ -66,7 +66,7 @@ impl<const N: usize> ArmCertifier<N> {
             form(dense(&gravity_jacobian(&member.model, &member.q)))
         };
         let found = UnstableLoop {
-            inertia_kg_m2: form(dense(&mass_matrix(&member.model, &member.q))),
+            inertia_kg_m2: form(dense(&mass_matrix_as_described(&member.model, &member.q))),
             friction_n_m_s_per_rad: friction,
             stiffness_n_m_per_rad: stiffness,
         };

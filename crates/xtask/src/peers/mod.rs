@@ -264,13 +264,14 @@ fn lines(programs: &Programs) -> Outcome {
         }
     }
     let points = seen.map(|(joints, ns)| (joints as f64, median(ns)));
-    let count = points.len() as f64;
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
-    let (x, y) = (mean(&|p| p.0), mean(&|p| p.1));
-    let slope = mean(&|p| (p.0 - x) * (p.1 - y)) / mean(&|p| (p.0 - x) * (p.0 - x));
+    // Deviations are shares of the time, so the line is fitted to shares: each point weighs as its inverse square.
+    let sum = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(|p| of(p) / (p.1 * p.1)).sum::<f64>();
+    let weight = sum(&|_| 1.0);
+    let (x, y) = (sum(&|p| p.0) / weight, sum(&|p| p.1) / weight);
+    let slope = sum(&|p| (p.0 - x) * (p.1 - y)) / sum(&|p| (p.0 - x) * (p.0 - x));
     let at = |joints: f64| y + slope * (joints - x);
     let off = |(joints, ns): &(f64, f64)| 100.0 * (ns / at(*joints) - 1.0);
-    println!("\nclosed loop of chains, least squares: {:.1} ns + {slope:.1} ns a joint", at(0.0));
+    println!("\nclosed loop of chains, least squares of the shares: {:.1} ns + {slope:.1} ns a joint", at(0.0));
     for point in &points {
         println!("{:>4.0} joints {:>9.1} ns, {:+.1} % of the line", point.0, point.1, off(point));
     }
