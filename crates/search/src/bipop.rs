@@ -98,7 +98,7 @@ impl Bipop {
         &self.run
     }
 
-    /// Accounts for the run that has ended and begins the next one.
+    /// Accounts for the run that is over and begins the next one.
     fn restart(&mut self) {
         let spent = self.run.evaluations();
         match self.regime {

@@ -1,6 +1,9 @@
 //! Points drawn evenly over the box, to begin with.
 //!
 //! A population that starts in one place learns the slope there before it has seen anything else. Some dozens of points in all of the box tell in which basin to start.
+//!
+//! The optimum often lies on a bound, where a density has no weight: coordinates are drawn from a box that is wider by [`BEYOND`] on each side, and clipped, so that about a
+//! quarter of them lie on a bound.
 
 use rand::Rng;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
@@ -10,6 +13,9 @@ use crate::search::{Best, Ending, Search, SetupError, TellError, check_scores};
 
 /// Points asked at a time: enough to keep the threads of a machine busy.
 const BLOCK: usize = 8;
+
+/// How far beyond a bound coordinates are drawn before they are clipped.
+const BEYOND: f64 = 0.15;
 
 /// A given number of points, drawn evenly and independently.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,7 +44,8 @@ impl Search for Scatter {
         if self.asked.is_empty() {
             let (count, dimension) = (BLOCK.min(self.points - self.told), self.dimension);
             let generator = &mut self.generator;
-            let mut point = || (0..dimension).map(|_| generator.random()).collect();
+            let mut coordinate = || ((1.0 + 2.0 * BEYOND) * generator.random::<f64>() - BEYOND).clamp(0.0, 1.0);
+            let mut point = || (0..dimension).map(|_| coordinate()).collect();
             self.asked = (0..count).map(|_| point()).collect();
         }
         self.asked.clone()

@@ -22,6 +22,8 @@ struct Book {
     known: HashMap<[u64; 7], usize>,
     best: usize,
     phase: Phase,
+    /// Best and worst outcome of the last generation.
+    generation: Option<[Outcome; 2]>,
 }
 
 /// A candidate to be evaluated; `known` is its index when it was stopped too early before.
@@ -47,7 +49,8 @@ impl<'a> Ledger<'a> {
         progress: &'a dyn Progress,
         settings: &SearchSettings,
     ) -> Self {
-        let book = Book { evaluations: Vec::new(), known: HashMap::new(), best: 0, phase: Phase::Start };
+        let book =
+            Book { evaluations: Vec::new(), known: HashMap::new(), best: 0, phase: Phase::Start, generation: None };
         let (budget, stop_early) = (settings.evaluations, settings.stop_early);
         Self { space, objective, progress, budget, stop_early, book: Mutex::new(book) }
     }
@@ -73,9 +76,18 @@ impl<'a> Ledger<'a> {
         self.budget - self.len()
     }
 
-    /// Index of the best evaluation.
-    pub(super) fn best_index(&self) -> usize {
-        self.book().best
+    /// The lowest cost, if any candidate has one.
+    pub(super) fn best_cost(&self) -> Option<f64> {
+        let book = self.book();
+        book.evaluations.get(book.best)?.outcome.cost()
+    }
+
+    /// Whether the last generation lies in a basin that is known to the bottom: all of its costs are within a share of each other, and none is lower than the best by that share.
+    pub(super) fn is_flat(&self, share: f64) -> bool {
+        let book = self.book();
+        let best = book.evaluations.get(book.best).and_then(|best| best.outcome.cost());
+        let Some([Some(first), Some(last)]) = book.generation.map(|ends| ends.map(Outcome::cost)) else { return false };
+        last - first <= share * first && best.is_some_and(|best| first >= best * (1.0 - share))
     }
 
     pub(super) fn best(&self) -> Option<Gains> {
@@ -156,7 +168,10 @@ impl<'a> Ledger<'a> {
             let index = book.known.get(&gains.bits()).ok_or(BudgetSpent)?;
             Ok(book.evaluations[*index].outcome)
         };
-        candidates.iter().map(outcome).collect()
+        let outcomes: Vec<Outcome> = candidates.iter().map(outcome).collect::<Result<_, _>>()?;
+        let ends = outcomes.iter().min().zip(outcomes.iter().max());
+        book.generation = ends.map(|(best, worst)| [*best, *worst]);
+        Ok(outcomes)
     }
 }
 

@@ -1,17 +1,19 @@
 //! The default: Nelder-Mead from the start, CMA-ES where a look at the whole space says, Nelder-Mead again around the best.
 //!
 //! ```text
-//! simplex    from the start                until it converges, gains nothing for a while, or has spent a fifth of the budget
+//! simplex    from the start                until it converges, gains little for a while, or has spent a fifth of the budget
 //! scatter    over the whole space          eight points a gain, at most a fifth of the budget
-//! cma-es     from the best of the scatter  until eight tenths of the budget are spent
-//! polish     around the best               until it converges
-//! cma-es     goes on, restarted            until the budget is spent
+//! cma-es     from the best of the scatter  until it has come down, no deeper than the best known
+//! ...        the two in turn               until eight tenths of the budget are spent
+//! polish     around the best               until it converges; then the two in turn again
 //! ```
 //!
 //! Published gains are good, so the simplex improves on them at once, but it stays in their basin; the scatter sees others; the last digits are the simplex's again.
 
+use core::ops::RangeFrom;
+
 use argmin::core::Error;
-use certune_search::{Bipop, BipopOptions, Options, Scatter, Search};
+use certune_search::{Bipop, BipopOptions, Cma, Options, Scatter, Search};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
@@ -23,32 +25,35 @@ use crate::outcome::score_of_ratio;
 use crate::streams;
 
 /// Spread of the first population of CMA-ES and of its large restarts, a fraction of each range.
-const SIGMA: f64 = 0.25;
+const SIGMA: f64 = 0.2;
+/// Points of a scatter for each gain.
+const SCATTERED: usize = 8;
+/// A generation whose costs lie within this share of each other, and of the best known, has nothing more to find; the last digits are the polish's.
+const FLAT: f64 = 0.01;
+/// A simplex that gains less than this share in a while has had its turn.
+const GAIN: f64 = 0.002;
 /// Edge of the polishing simplex, a fraction of each range.
 const POLISH: f64 = 0.03;
 
-/// CMA-ES with restarts, from `centre`.
-fn cma_es(centre: &[f64], settings: &SearchSettings) -> Result<Bipop, Error> {
-    // Scores below each other by less than nobody can tell apart are a flat valley: the run begins anew elsewhere.
-    let run = Options { tol_fun: score_of_ratio(SPREAD), tol_x: 1e-3, ..Options::default() };
-    let seed = chance(settings, streams::CMA_ES);
-    Ok(Bipop::new(centre, SIGMA, seed, BipopOptions { run, sigma: SIGMA, ..BipopOptions::default() })?)
+/// Scores below each other by less than anybody can tell apart are a flat valley.
+fn tolerances() -> Options {
+    Options { tol_fun: score_of_ratio(SPREAD), tol_x: 1e-3, ..Options::default() }
 }
 
-/// The seed that belongs to a part of the search.
-fn chance(settings: &SearchSettings, stream: u64) -> u64 {
+/// The seed that belongs to the `count`-th use of a part of the search.
+fn chance(settings: &SearchSettings, stream: u64, count: u32) -> u64 {
     let mut chance = ChaCha8Rng::seed_from_u64(settings.seed);
     chance.set_stream(stream);
+    chance.set_word_pos(2 * u128::from(count));
     chance.next_u64()
 }
 
-fn restart_of(search: &Bipop) -> Phase {
-    Phase::CmaEs { restart: search.restarts() }
-}
-
-/// CMA-ES alone, from `centre`.
+/// CMA-ES alone, from `centre`, with large and small restarts.
 pub(super) fn cma_alone(ledger: &Ledger<'_>, centre: &[f64], settings: &SearchSettings) -> Result<Termination, Error> {
-    Ok(match run(ledger, &mut cma_es(centre, settings)?, restart_of, || false)? {
+    let options = BipopOptions { run: tolerances(), sigma: SIGMA, ..BipopOptions::default() };
+    let mut search = Bipop::new(centre, SIGMA, chance(settings, streams::CMA_ES, 0), options)?;
+    let phase = |search: &Bipop| Phase::CmaEs { restart: search.restarts() };
+    Ok(match run(ledger, &mut search, phase, || false)? {
         Left::BudgetSpent => Termination::BudgetSpent,
         Left::Ended | Left::TurnOver => Termination::Converged,
     })
@@ -74,21 +79,16 @@ pub(super) fn schedule(
 ) -> Result<Termination, Error> {
     let (budget, dimension) = (settings.evaluations, ledger.space().dimension());
     if let Some(start) = start {
-        let turn = Turn::new(ledger, budget / 5, 6 * (dimension + 1));
+        let mut turn = Turn::new(ledger, budget / 5, 4 * (dimension + 1));
         if run(ledger, &mut simplex(start, settings.simplex_step)?, |_| Phase::Simplex, || turn.is_over(ledger))?
             == Left::BudgetSpent
         {
             return Ok(Termination::BudgetSpent);
         }
     }
-    let mut scatter = Scatter::new(dimension, (8 * dimension).min(budget / 5), chance(settings, streams::SCATTER))?;
-    if run(ledger, &mut scatter, |_| Phase::Scatter, || false)? == Left::BudgetSpent {
-        return Ok(Termination::BudgetSpent);
-    }
-    let centre = scatter.best().map_or_else(|| vec![0.5; dimension], |best| best.point.clone());
-    let mut search = cma_es(&centre, settings)?;
+    let mut rounds = 0..;
     let polish_from = budget - budget / 5;
-    let mut left = run(ledger, &mut search, restart_of, || ledger.len() >= polish_from)?;
+    let mut left = explore(ledger, settings, &mut rounds, || ledger.len() >= polish_from)?;
     if left != Left::BudgetSpent
         && let Some(best) = ledger.best()
     {
@@ -96,25 +96,63 @@ pub(super) fn schedule(
         left = run(ledger, &mut simplex(&best, POLISH)?, |_| Phase::Polish, || false)?;
     }
     if left != Left::BudgetSpent {
-        left = run(ledger, &mut search, restart_of, || false)?;
+        left = explore(ledger, settings, &mut rounds, || false)?;
     }
     Ok(if left == Left::BudgetSpent { Termination::BudgetSpent } else { Termination::Converged })
 }
 
-/// How long a search that may stop helping goes on.
+/// Rounds of a scatter and a run of CMA-ES from its best, until `turn_over`. A run that has come down into a basin no deeper than the best known is left for the next round.
+fn explore(
+    ledger: &Ledger<'_>,
+    settings: &SearchSettings,
+    rounds: &mut RangeFrom<u32>,
+    turn_over: impl Fn() -> bool,
+) -> Result<Left, Error> {
+    let dimension = ledger.space().dimension();
+    for restart in rounds {
+        let before = ledger.len();
+        let points = (SCATTERED * dimension).min(settings.evaluations / 5);
+        let mut scatter = Scatter::new(dimension, points, chance(settings, streams::SCATTER, restart))?;
+        let left = run(ledger, &mut scatter, |_| Phase::Scatter, &turn_over)?;
+        if left != Left::Ended {
+            return Ok(left);
+        }
+        let centre = scatter.best().map_or_else(|| vec![0.5; dimension], |best| best.point.clone());
+        let mut search = Cma::new(&centre, SIGMA, chance(settings, streams::CMA_ES, restart), tolerances())?;
+        let flat = || turn_over() || ledger.is_flat(FLAT);
+        let left = run(ledger, &mut search, |_| Phase::CmaEs { restart }, flat)?;
+        if left == Left::BudgetSpent || turn_over() {
+            return Ok(left);
+        }
+        if ledger.len() == before {
+            break; // every point of the space is known
+        }
+    }
+    Ok(Left::Ended)
+}
+
+/// How long a simplex that may stop helping goes on.
 struct Turn {
     /// The ledger's length at which it is over in any case.
     end: usize,
-    /// Evaluations without a new best after which it is over.
+    /// Evaluations without a gain of [`GAIN`] after which it is over.
     patience: usize,
+    /// Where the last such gain was made, and the cost there.
+    last: Option<(usize, f64)>,
 }
 
 impl Turn {
     fn new(ledger: &Ledger<'_>, evaluations: usize, patience: usize) -> Self {
-        Self { end: ledger.len() + evaluations, patience }
+        Self { end: ledger.len() + evaluations, patience, last: None }
     }
 
-    fn is_over(&self, ledger: &Ledger<'_>) -> bool {
-        ledger.len() >= self.end || ledger.len() - ledger.best_index() > self.patience
+    fn is_over(&mut self, ledger: &Ledger<'_>) -> bool {
+        let now = ledger.len();
+        if let Some(cost) = ledger.best_cost()
+            && self.last.is_none_or(|(_, before)| cost < before * (1.0 - GAIN))
+        {
+            self.last = Some((now, cost));
+        }
+        now >= self.end || self.last.is_some_and(|(at, _)| now - at > self.patience)
     }
 }
