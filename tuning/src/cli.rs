@@ -12,7 +12,7 @@ use certune::verify::ClaimKind;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
-use crate::commands::{certify, constants, inspect, lists, report, simulate, tune, verify};
+use crate::commands::{ask_tell, certify, constants, inspect, lists, report, simulate, tune, verify};
 use crate::error::Error;
 use crate::output;
 use crate::values::{
@@ -57,6 +57,8 @@ pub struct Context {
 pub enum Command {
     /// Search for gains, certify the best and write a report (the default command)
     Tune(TuneArgs),
+    /// Search for gains with scores that you provide: candidates out and scores in, a JSON line each
+    AskTell(AskTellArgs),
     /// Certify that an arm with given gains is stable, or say why not
     Certify(CertifyArgs),
     /// Check certificates again, in exact arithmetic, from the files alone
@@ -131,6 +133,28 @@ pub struct TuneArgs {
     /// Folder for the results [default: runs/ROBOT-CONTROLLER-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct AskTellArgs {
+    /// Search space: a TOML file [default: the built-in panda-aic]
+    #[arg(long, value_name = "FILE")]
+    pub space: Option<String>,
+    /// Candidates to evaluate [default: 100]
+    #[arg(long, value_name = "N")]
+    pub budget: Option<usize>,
+    /// Seed of every random draw [default: 1]
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Robot whose linearised loops keep unstable gains from being asked for: built-in or a URDF file
+    #[arg(long, value_name = "NAME|FILE.urdf")]
+    pub robot: Option<String>,
+    /// Last link of the arm, for a URDF file that branches
+    #[arg(long, value_name = "LINK", requires = "robot")]
+    pub tip: Option<String>,
+    /// Scenario whose plants those loops are about, by name or TOML file [default: pick-and-place; for a URDF file a generic one]
+    #[arg(long, value_name = "NAME|FILE", requires = "robot")]
+    pub scenario: Option<String>,
 }
 
 /// Which configurations a claim speaks of.
@@ -374,6 +398,7 @@ fn dispatch(cli: Cli) -> Result<Exit, Error> {
     let context = cli.shared;
     match (cli.command, cli.tune) {
         (Some(Command::Tune(args)), _) | (None, Some(args)) => tune::run(&args, context),
+        (Some(Command::AskTell(args)), _) => ask_tell::run(&args),
         (Some(Command::Certify(args)), _) => certify::run(&args, context),
         (Some(Command::Verify(args)), _) => verify::run(&args, context),
         (Some(Command::Constants(args)), _) => constants::run(&args, context),

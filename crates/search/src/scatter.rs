@@ -2,7 +2,7 @@
 //!
 //! A population that starts in one place learns the slope there before it has seen anything else. Some dozens of points in all of the box tell in which basin to start.
 //!
-//! The optimum often lies on a bound, where a density has no weight: coordinates are drawn from a box that is wider by [`BEYOND`] on each side, and clipped, so that about a
+//! The optimum often lies on a bound, where a density has no weight: coordinates are drawn from a box that is wider by 0.15 on each side, and clipped, so that about a
 //! quarter of them lie on a bound.
 
 use rand::Rng;

@@ -126,7 +126,7 @@ impl<const N: usize> Batch<N> {
             .collect()
     }
 
-    /// What the plants say together, given up once that is known to be worse than `enough`: every [`LOOK_EVERY_S`] each bundle of plants writes down what its
+    /// What the plants say together, given up once that is known to be worse than `enough`: every half second of the task each bundle of plants writes down what its
     /// runs cost at least, and all stop when the plants together cost too much, or one has diverged.
     ///
     /// Which thread sees it first depends on the hour; the answer does not, as whatever is worse than `enough` is answered alike.

@@ -21,6 +21,8 @@ pub use filter::StabilityFilter;
 pub use gains::{Gain, Gains, NotShared};
 pub use outcome::{Finite, NotFinite, Outcome};
 pub use record::{Attempt, Figures, HeldOut, PlantResult, Question, RunRecord, Sensitivity, Verdict};
-pub use search::{Evaluation, Objective, Phase, Progress, SearchError, SearchRun, SearchSettings, Termination, search};
+pub use search::{
+    Candidate, Evaluation, Objective, Phase, Progress, SearchError, SearchRun, SearchSettings, Termination, search,
+};
 pub use space::{Freedom, Method, ObjectiveName, Range, Scale, Space, SpaceError};
 pub use tune::{Bench, Judge, Stage, TuneError, TuneProgress, Tuned, tune};

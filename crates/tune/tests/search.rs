@@ -3,8 +3,8 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use certune_tune::{
-    Evaluation, Finite, Freedom, Gain, Gains, Method, Objective, Outcome, Phase, Progress, Range, Scale, SearchError,
-    SearchSettings, Space, SpaceError, Termination, search,
+    Candidate, Evaluation, Finite, Freedom, Gain, Gains, Method, Objective, Outcome, Phase, Progress, Range, Scale,
+    SearchError, SearchSettings, Space, SpaceError, Termination, search,
 };
 use proptest::prelude::*;
 
@@ -133,6 +133,33 @@ impl Objective for Hasty {
     }
 }
 
+/// An objective that answers a given number of generations.
+struct Tired(AtomicUsize);
+
+impl Objective for Tired {
+    fn evaluate(&self, gains: &Gains, _: Option<Finite>) -> Outcome {
+        bowl(gains)
+    }
+    fn evaluate_all(&self, candidates: &[Candidate]) -> Option<Vec<Outcome>> {
+        let left = self.0.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |left| left.checked_sub(1));
+        left.ok().map(|_| candidates.iter().map(|candidate| bowl(&candidate.gains)).collect())
+    }
+}
+
+#[test]
+fn a_search_that_nobody_answers_any_more_ends_with_what_it_has() {
+    for method in METHODS {
+        for generations in [0, 1, 5] {
+            let tired = Tired(AtomicUsize::new(generations));
+            let whole = search(&space(3), Some(&ones()), &SearchSettings::new(method, 100, 1), &bowl, &()).unwrap();
+            let run = search(&space(3), Some(&ones()), &SearchSettings::new(method, 100, 1), &tired, &()).unwrap();
+            assert_eq!(run.termination, Termination::Interrupted);
+            assert!(run.evaluations.len() >= generations && run.evaluations.len() < whole.evaluations.len());
+            assert_eq!(run.evaluations, whole.evaluations[..run.evaluations.len()]);
+        }
+    }
+}
+
 #[test]
 fn a_swarm_does_not_see_the_start_and_depends_on_its_seed() {
     let settings = SearchSettings::new(Method::ParticleSwarm, 40, 1);
@@ -202,6 +229,7 @@ proptest! {
         match run.termination {
             Termination::BudgetSpent => prop_assert_eq!(calls, budget),
             Termination::Converged => prop_assert!(calls < budget),
+            Termination::Interrupted => prop_assert!(false, "somebody always answers"),
         }
         prop_assert!(run.evaluations.iter().enumerate().all(|(index, evaluation)| evaluation.index == index));
     }

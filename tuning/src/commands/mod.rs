@@ -1,5 +1,6 @@
 //! One file a command: read what it needs, call the library, print.
 
+pub mod ask_tell;
 pub mod certify;
 pub mod claims;
 pub mod constants;

@@ -26,8 +26,8 @@ use crate::run::{Folder, Run, RunFile};
 use crate::sizes::for_joint_count;
 use crate::versions::versions;
 
-const DEFAULT_BUDGET: usize = 100;
-const DEFAULT_SEED: u64 = 1;
+pub const DEFAULT_BUDGET: usize = 100;
+pub const DEFAULT_SEED: u64 = 1;
 /// Plants on which every candidate is simulated.
 const DEFAULT_PLANTS: usize = 8;
 /// Plants that judge start and winner.
@@ -125,10 +125,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     let family = family_of(&scenario.plant_box)?;
     let records = catalogue::records(&[])?;
     let (space_name, space) = catalogue::space(args.space.as_deref())?;
-    let preset = space.start().unwrap_or(DEFAULT_PRESET).to_owned();
-    let source = GainsSource::find(&preset)?;
-    let start =
-        Gains::from_table(source.aic("tune")?).map_err(|source| Error::NotShared { gains: preset.clone(), source })?;
+    let (preset, start) = start_of(&space)?;
     // A start outside the space is refused before anything is computed.
     space.admit(&start).map_err(|error| TuneError::from(SearchError::Start(error)))?;
     let seed = args.seed.unwrap_or(DEFAULT_SEED);
@@ -159,6 +156,15 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
             .map_or_else(|| preset.clone(), |name| name.to_string_lossy().into_owned()),
         space_name,
     })
+}
+
+/// Where a search of `space` begins: the name of the gains, and the gains.
+pub fn start_of(space: &Space) -> Result<(String, Gains), Error> {
+    let preset = space.start().unwrap_or(DEFAULT_PRESET).to_owned();
+    let source = GainsSource::find(&preset)?;
+    let start =
+        Gains::from_table(source.aic("tune")?).map_err(|source| Error::NotShared { gains: preset.clone(), source })?;
+    Ok((preset, start))
 }
 
 /// `panda-aic-1`; a URDF may name its robot with anything, a folder may not.

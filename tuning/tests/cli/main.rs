@@ -2,6 +2,7 @@
 
 #![expect(clippy::unwrap_used, clippy::panic, reason = "a test stops at the first surprise")]
 
+mod ask_tell;
 mod bad_input;
 mod commands;
 mod common;

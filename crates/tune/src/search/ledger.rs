@@ -4,14 +4,13 @@ use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use argmin::core::{CostFunction, Error, SendAlias, SyncAlias};
-use rayon::prelude::*;
 
-use super::{Evaluation, Objective, Phase, Progress, SearchSettings};
+use super::{Candidate, Evaluation, Objective, Phase, Progress, SearchSettings};
 use crate::gains::Gains;
 use crate::outcome::{Finite, Outcome};
 use crate::space::Space;
 
-/// The answer to a request for one evaluation more than the budget holds; it ends the solver's run.
+/// The answer to a request for one evaluation more than the budget holds, or that nobody answers; it ends the solver's run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("every evaluation of the budget is used")]
 pub(super) struct BudgetSpent;
@@ -24,12 +23,12 @@ struct Book {
     phase: Phase,
     /// Best and worst outcome of the last generation.
     generation: Option<[Outcome; 2]>,
+    interrupted: bool,
 }
 
 /// A candidate to be evaluated; `known` is its index when it was stopped too early before.
 struct Task {
-    gains: Gains,
-    enough: Option<Finite>,
+    candidate: Candidate,
     known: Option<usize>,
 }
 
@@ -49,8 +48,14 @@ impl<'a> Ledger<'a> {
         progress: &'a dyn Progress,
         settings: &SearchSettings,
     ) -> Self {
-        let book =
-            Book { evaluations: Vec::new(), known: HashMap::new(), best: 0, phase: Phase::Start, generation: None };
+        let book = Book {
+            evaluations: Vec::new(),
+            known: HashMap::new(),
+            best: 0,
+            phase: Phase::Start,
+            generation: None,
+            interrupted: false,
+        };
         let (budget, stop_early) = (settings.evaluations, settings.stop_early);
         Self { space, objective, progress, budget, stop_early, book: Mutex::new(book) }
     }
@@ -58,6 +63,10 @@ impl<'a> Ledger<'a> {
     /// The book is whole between any two statements that change it, so a panic elsewhere does not spoil it.
     fn book(&self) -> MutexGuard<'_, Book> {
         self.book.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn is_interrupted(&self) -> bool {
+        self.book().interrupted
     }
 
     pub(super) const fn space(&self) -> &Space {
@@ -87,7 +96,7 @@ impl<'a> Ledger<'a> {
         let book = self.book();
         let best = book.evaluations.get(book.best).and_then(|best| best.outcome.cost());
         let Some([Some(first), Some(last)]) = book.generation.map(|ends| ends.map(Outcome::cost)) else { return false };
-        last - first <= share * first && best.is_some_and(|best| first >= best * (1.0 - share))
+        last - first <= share * first.abs() && best.is_some_and(|best| first >= best - share * best.abs())
     }
 
     pub(super) fn best(&self) -> Option<Gains> {
@@ -128,8 +137,8 @@ impl<'a> Ledger<'a> {
             let mut left = self.budget - book.evaluations.len();
             for (place, gains) in candidates.iter().enumerate() {
                 let (bits, enough) = (gains.bits(), enough(place));
-                if let Some(task) = tasks.iter_mut().find(|task| task.gains.bits() == bits) {
-                    task.enough = task.enough.zip(enough).map(|(a, b)| a.max(b));
+                if let Some(task) = tasks.iter_mut().find(|task| task.candidate.gains.bits() == bits) {
+                    task.candidate.enough = task.candidate.enough.zip(enough).map(|(a, b)| a.max(b));
                     continue;
                 }
                 let known = book.known.get(&bits).copied();
@@ -141,14 +150,17 @@ impl<'a> Ledger<'a> {
                     continue;
                 }
                 left -= usize::from(known.is_none());
-                tasks.push(Task { gains: *gains, enough, known });
+                tasks.push(Task { candidate: Candidate { gains: *gains, enough }, known });
             }
         }
-        // Indexed, so that the outcomes come back in the order of the candidates whatever thread made them.
-        let outcomes: Vec<_> = tasks.par_iter().map(|task| self.objective.evaluate(&task.gains, task.enough)).collect();
+        let asked: Vec<Candidate> = tasks.iter().map(|task| task.candidate).collect();
+        let Some(outcomes) = self.objective.evaluate_all(&asked) else {
+            self.book().interrupted = true;
+            return Err(BudgetSpent);
+        };
 
         let mut book = self.book();
-        for (Task { gains, known, .. }, outcome) in tasks.into_iter().zip(outcomes) {
+        for (Task { candidate: Candidate { gains, .. }, known }, outcome) in tasks.into_iter().zip(outcomes) {
             let index = known.unwrap_or(book.evaluations.len());
             let evaluation = Evaluation { index, phase: book.phase, gains, outcome };
             if known.is_some() {

@@ -24,6 +24,7 @@ mod schedule;
 mod simplex;
 mod swarm;
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use simplex::SPREAD;
@@ -39,6 +40,21 @@ pub trait Objective: Sync {
     ///
     /// Whatever costs more than `enough`, or fails in simulation, may be answered with [`Outcome::Stopped`], as soon as that is sure.
     fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome;
+
+    /// The outcomes of a generation in its order; none when nobody answers any more, which ends the search. By default all at once, on the current rayon pool.
+    fn evaluate_all(&self, candidates: &[Candidate]) -> Option<Vec<Outcome>> {
+        // Indexed, so that the outcomes come back in the order of the candidates whatever thread made them.
+        Some(candidates.par_iter().map(|candidate| self.evaluate(&candidate.gains, candidate.enough)).collect())
+    }
+}
+
+/// What a search wants to know.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// The gains.
+    pub gains: Gains,
+    /// What costs more need not be known better than that.
+    pub enough: Option<Finite>,
 }
 
 /// An objective that never stops early.
@@ -104,6 +120,8 @@ pub enum Termination {
     BudgetSpent,
     /// The solver met only candidates that it knew, although evaluations were left.
     Converged,
+    /// Nobody answered any more.
+    Interrupted,
 }
 
 /// How to search.
@@ -221,5 +239,6 @@ pub fn search(
             ended.map_err(failed)?
         }
     };
+    let termination = if ledger.is_interrupted() { Termination::Interrupted } else { termination };
     Ok(SearchRun { evaluations: ledger.into_evaluations(), termination })
 }

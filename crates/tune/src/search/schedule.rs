@@ -149,7 +149,7 @@ impl Turn {
     fn is_over(&mut self, ledger: &Ledger<'_>) -> bool {
         let now = ledger.len();
         if let Some(cost) = ledger.best_cost()
-            && self.last.is_none_or(|(_, before)| cost < before * (1.0 - GAIN))
+            && self.last.is_none_or(|(_, before)| cost < before - GAIN * before.abs())
         {
             self.last = Some((now, cost));
         }
