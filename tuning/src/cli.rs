@@ -118,7 +118,7 @@ pub struct TuneArgs {
     /// What the search is after [default: as the search space says, or settling-cost]
     #[arg(long, value_name = "settling-cost|certified-rate|certified-radius", value_parser = objective)]
     pub objective: Option<ObjectiveName>,
-    /// Candidates to evaluate [default: 100]
+    /// Candidates to evaluate [default: 300]
     #[arg(long, value_name = "N")]
     pub budget: Option<usize>,
     /// Plants of the scenario's box on which each candidate is simulated [default: 8]
@@ -140,7 +140,7 @@ pub struct AskTellArgs {
     /// Search space: a TOML file [default: the built-in panda-aic]
     #[arg(long, value_name = "FILE")]
     pub space: Option<String>,
-    /// Candidates to evaluate [default: 100]
+    /// Candidates to evaluate [default: 300]
     #[arg(long, value_name = "N")]
     pub budget: Option<usize>,
     /// Seed of every random draw [default: 1]

@@ -26,7 +26,7 @@ use crate::run::{Folder, Run, RunFile};
 use crate::sizes::for_joint_count;
 use crate::versions::versions;
 
-pub const DEFAULT_BUDGET: usize = 100;
+pub const DEFAULT_BUDGET: usize = 300;
 pub const DEFAULT_SEED: u64 = 1;
 /// Plants on which every candidate is simulated.
 const DEFAULT_PLANTS: usize = 8;

@@ -1,7 +1,7 @@
 //! The default: Nelder-Mead from the start, CMA-ES where a look at the whole space says, Nelder-Mead again around the best.
 //!
 //! ```text
-//! simplex    from the start                until it converges, gains little for a while, or has spent a fifth of the budget
+//! simplex    from the start                until it converges, gains little for a while, or has spent a fifth of the budget (eight times the corners at least)
 //! scatter    over the whole space          eight points a gain, at most a fifth of the budget
 //! cma-es     from the best of the scatter  until it has come down, no deeper than the best known
 //! ...        the two in turn               until eight tenths of the budget are spent
@@ -32,6 +32,8 @@ const SCATTERED: usize = 8;
 const FLAT: f64 = 0.01;
 /// A simplex that gains less than this share in a while has had its turn.
 const GAIN: f64 = 0.002;
+/// A small budget is the simplex's: each of its corners may move this often before anybody looks elsewhere.
+const SHORTEST: usize = 8;
 /// Edge of the polishing simplex, a fraction of each range.
 const POLISH: f64 = 0.03;
 
@@ -79,7 +81,7 @@ pub(super) fn schedule(
 ) -> Result<Termination, Error> {
     let (budget, dimension) = (settings.evaluations, ledger.space().dimension());
     if let Some(start) = start {
-        let mut turn = Turn::new(ledger, budget / 5, 4 * (dimension + 1));
+        let mut turn = Turn::new(ledger, (budget / 5).max(SHORTEST * (dimension + 1)), 4 * (dimension + 1));
         if run(ledger, &mut simplex(start, settings.simplex_step)?, |_| Phase::Simplex, || turn.is_over(ledger))?
             == Left::BudgetSpent
         {
