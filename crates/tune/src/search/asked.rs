@@ -3,8 +3,8 @@
 use argmin::core::{Error, Executor, IterState, KV, Problem, Solver, TerminationReason, TerminationStatus};
 use certune_search::Search;
 
-use super::Phase;
 use super::ledger::{BudgetSpent, Ledger};
+use super::{Phase, Termination};
 use crate::outcome::Outcome;
 
 /// Why a search was left.
@@ -16,6 +16,15 @@ pub(super) enum Left {
     TurnOver,
     /// Every evaluation is used.
     BudgetSpent,
+}
+
+impl From<Left> for Termination {
+    fn from(left: Left) -> Self {
+        match left {
+            Left::BudgetSpent => Self::BudgetSpent,
+            Left::Ended | Left::TurnOver => Self::Converged,
+        }
+    }
 }
 
 /// Runs `search` until it ends, `turn_over` says so after a generation, or the budget is spent. `phase` names what the search is at.

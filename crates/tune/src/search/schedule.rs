@@ -55,10 +55,7 @@ pub(super) fn cma_alone(ledger: &Ledger<'_>, centre: &[f64], settings: &SearchSe
     let options = BipopOptions { run: tolerances(), sigma: SIGMA, ..BipopOptions::default() };
     let mut search = Bipop::new(centre, SIGMA, chance(settings, streams::CMA_ES, 0), options)?;
     let phase = |search: &Bipop| Phase::CmaEs { restart: search.restarts() };
-    Ok(match run(ledger, &mut search, phase, || false)? {
-        Left::BudgetSpent => Termination::BudgetSpent,
-        Left::Ended | Left::TurnOver => Termination::Converged,
-    })
+    Ok(run(ledger, &mut search, phase, || false)?.into())
 }
 
 /// Nelder-Mead alone, from `centre`.
@@ -67,10 +64,7 @@ pub(super) fn simplex_alone(
     centre: &[f64],
     settings: &SearchSettings,
 ) -> Result<Termination, Error> {
-    Ok(match run(ledger, &mut simplex(centre, settings.simplex_step)?, |_| Phase::Simplex, || false)? {
-        Left::BudgetSpent => Termination::BudgetSpent,
-        Left::Ended | Left::TurnOver => Termination::Converged,
-    })
+    Ok(run(ledger, &mut simplex(centre, settings.simplex_step)?, |_| Phase::Simplex, || false)?.into())
 }
 
 /// The whole schedule; without a `start` it begins with the scatter.
@@ -100,7 +94,7 @@ pub(super) fn schedule(
     if left != Left::BudgetSpent {
         left = explore(ledger, settings, &mut rounds, || false)?;
     }
-    Ok(if left == Left::BudgetSpent { Termination::BudgetSpent } else { Termination::Converged })
+    Ok(left.into())
 }
 
 /// Rounds of a scatter and a run of CMA-ES from its best, until `turn_over`. A run that has come down into a basin no deeper than the best known is left for the next round.
