@@ -63,7 +63,7 @@ pub use metrics::{Metrics, Segment};
 pub use plant_box::{PlantBox, PlantError, PlantSetting};
 pub use scenario::Scenario;
 pub use simulate::{
-    Bundle, NoiseStream, Plant, Progress, Recorder, Run, Sample, Simulation, simulate, simulate_many, simulate_many_on,
+    Bundle, MAX_DELAY_SAMPLES, NoiseStream, Plant, Progress, Recorder, Run, Sample, Simulation, simulate, simulate_many, simulate_many_on,
     simulate_many_while,
 };
 pub use task::Task;

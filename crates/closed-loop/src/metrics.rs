@@ -12,6 +12,7 @@
 //! | saturation | `saturated_steps` | samples in which that exceeds the motor's limit | 1 |
 //! | jitter | `torque_rate_rms_n_m_per_s` | root mean square of `(tau_k - tau_{k-1})/h`, of the torque the motor gives | N m/s |
 //! | ITAE | `itae_rad_s2` | `sum h t \|e\|` | rad s² |
+//! | energy | `energy_j` | `sum h \|tau dq\|` of the torque the motor gives: the mechanical work it does and takes | J |
 //!
 //! The goal is the task's, also where the controller's goal is still on its way there.
 //! The torque asked of the motor is the controller's, delayed, plus the gravity compensation. Saturation is counted whether or not
@@ -50,6 +51,8 @@ pub struct Segment {
     pub torque_rate_rms_n_m_per_s: Vec<f64>,
     /// Integral of time times absolute error, rad s².
     pub itae_rad_s2: Vec<f64>,
+    /// Integral of the absolute mechanical power of the motor, J.
+    pub energy_j: Vec<f64>,
     /// Largest joint speed, rad/s.
     pub peak_speed_rad_per_s: Vec<f64>,
 }
@@ -128,6 +131,8 @@ pub(crate) struct Meter<const N: usize, T: Real = f64> {
     rates: T,
     /// Sum of sample number times |e|.
     itae: Joints<N, T>,
+    /// Sum of |tau dq|.
+    power: Joints<N, T>,
 }
 
 impl<const N: usize> Meter<N> {
@@ -146,6 +151,7 @@ impl<const N: usize> Meter<N> {
             rate_squares: Joints::zeros(),
             rates: 0.0,
             itae: Joints::zeros(),
+            power: Joints::zeros(),
         }
     }
 }
@@ -170,6 +176,7 @@ impl<const N: usize, T: Lanes> Meter<N, T> {
             rate_squares: joints(|m| &m.rate_squares),
             rates: number(|m| m.rates),
             itae: joints(|m| &m.itae),
+            power: joints(|m| &m.power),
         }
     }
 
@@ -190,6 +197,7 @@ impl<const N: usize, T: Lanes> Meter<N, T> {
             rate_squares: joints(&self.rate_squares),
             rates: self.rates.lane(lane),
             itae: joints(&self.itae),
+            power: joints(&self.power),
         }
     }
 
@@ -220,6 +228,7 @@ impl<const N: usize, T: Lanes> Meter<N, T> {
             self.peak_speed[joint] = largest(self.peak_speed[joint], speed);
             self.saturated[joint] += asked.choose(limit[joint], zero, one);
             self.itae[joint] = self.samples.mul_add(size, self.itae[joint]);
+            self.power[joint] = sample.given[joint].abs().mul_add(speed, self.power[joint]);
             if let Some(before) = previously_given {
                 let change = sample.given[joint] - before[joint];
                 self.rate_squares[joint] = change.mul_add(change, self.rate_squares[joint]);
@@ -250,6 +259,7 @@ impl<const N: usize> Meter<N> {
             saturated_steps: self.saturated.iter().map(|count| *count as u64).collect(),
             torque_rate_rms_n_m_per_s: each(&|joint| (self.rate_squares[joint] / self.rates.max(1.0)).sqrt() / step_s),
             itae_rad_s2: each(&|joint| self.itae[joint] * step_s * step_s),
+            energy_j: each(&|joint| self.power[joint] * step_s),
             peak_speed_rad_per_s: each(&|joint| self.peak_speed[joint]),
         }
     }
@@ -271,7 +281,8 @@ mod tests {
             let t = k as f64 * STEP_S;
             let q = Joints::<3>::new(2.0 - (-t / 0.5).exp(), -1.0 + (-t / 0.5).exp() * (8.0 * t).cos(), 0.5 + 0.01 * t);
             let given = Joints::<3>::new(30.0 * t, 5.0, -8.0 * t);
-            let sample = Contribution { q: &q, dq: &Joints::zeros(), asked: &given, given: &given };
+            let dq = Joints::<3>::new(0.0, -2.0, 0.0);
+            let sample = Contribution { q: &q, dq: &dq, asked: &given, given: &given };
             meter.add(&sample, before.as_ref(), &Joints::<3>::new(60.0, 10.0, 1e9));
             before = Some(given);
         }
@@ -294,6 +305,8 @@ mod tests {
         assert!((segment.torque_rate_rms_n_m_per_s[0] - 30.0).abs() < 1e-6);
         assert!((segment.torque_rate_rms_n_m_per_s[2] - 8.0).abs() < 1e-6);
         assert!(segment.torque_rate_rms_n_m_per_s[1].abs() < 1e-12);
+        // 5 N m at 2 rad/s for 3 s.
+        assert!((segment.energy_j[1] - 30.0).abs() < 1e-9);
         // Integral of t exp(-2t) from 0 to 3 is (1 - 7 exp(-6))/4; the sum is off by at most one step.
         assert!((segment.itae_rad_s2[0] - 0.25 * (1.0 - 7.0 * (-6.0_f64).exp())).abs() < STEP_S);
     }

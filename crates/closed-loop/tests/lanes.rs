@@ -84,6 +84,7 @@ fn assert_near(lanes: &Metrics, alone: &Metrics, relative: f64) {
             (&a.peak_torque_n_m, &b.peak_torque_n_m),
             (&a.torque_rate_rms_n_m_per_s, &b.torque_rate_rms_n_m_per_s),
             (&a.itae_rad_s2, &b.itae_rad_s2),
+            (&a.energy_j, &b.energy_j),
             (&a.peak_speed_rad_per_s, &b.peak_speed_rad_per_s),
         ];
         for (a, b) in pairs {

@@ -19,9 +19,10 @@ use rayon::prelude::*;
 
 use crate::filter::StabilityFilter;
 use crate::gains::Gains;
+use crate::goals::{Excess, Goal, Goals, Source};
 use crate::outcome::{Finite, Outcome};
 use crate::record::{PlantResult, Verdict};
-use crate::score;
+use crate::score::{self, Scoring};
 use crate::search::Objective;
 use crate::streams;
 use crate::tune::Judge;
@@ -47,13 +48,13 @@ pub enum BatchError {
 #[derive(Clone, Debug)]
 pub struct Batch<const N: usize> {
     task: Task<N>,
-    start_rad: Vec<f64>,
+    scoring: Scoring,
     seed: u64,
     plants: Vec<(u64, Plant<N>)>,
 }
 
 impl<const N: usize> Batch<N> {
-    /// The plants `indices` of `seed`, drawn from the box of `scenario`.
+    /// The plants `indices` of `seed`, drawn from the box of `scenario`, judged by their settling cost until [`Batch::with_goals`].
     ///
     /// # Errors
     /// [`BatchError`] when `indices` is empty or robot and scenario do not fit each other or `N`.
@@ -64,7 +65,27 @@ impl<const N: usize> Batch<N> {
         let task = scenario.bind(robot)?;
         let draw = |index| Ok((index, Plant::new(robot, &scenario.plant_box.draw(N, seed, index))?));
         let plants = indices.map(draw).collect::<Result<_, PlantError>>()?;
-        Ok(Self { task, start_rad: scenario.start_rad.clone(), seed, plants })
+        let scoring = Scoring::new(Goals::default(), &task);
+        Ok(Self { task, scoring, seed, plants })
+    }
+
+    /// The same plants, judged by other goals. What limits say of the start is not theirs to know: see [`Batch::resolved`].
+    #[must_use]
+    pub fn with_goals(self, goals: &Goals) -> Self {
+        Self { scoring: Scoring::new(goals.clone(), &self.task), ..self }
+    }
+
+    /// `goals` with numbers for what limits say of the gains that the search starts from: what those reach on the worst of these plants.
+    pub fn resolved(&self, goals: Goals, start: &Gains) -> Goals {
+        let Some(params) = self.params(start).filter(|_| goals.look_at_start()) else { return goals };
+        let found = self.metrics(&params);
+        let worst = |goal: Goal| found.iter().map(|run| self.scoring.figure(goal, run)).fold(0.0, f64::max);
+        goals.with_start(worst)
+    }
+
+    /// How its runs are judged.
+    pub const fn scoring(&self) -> &Scoring {
+        &self.scoring
     }
 
     /// The batch that a search meets: the first `plants` plants of `seed`.
@@ -110,44 +131,47 @@ impl<const N: usize> Batch<N> {
         plants.iter().map(run).collect()
     }
 
+    /// The figures of one run on each plant.
+    fn metrics(&self, params: &AicParams<N>) -> Vec<Metrics> {
+        // As many plants at a time as run side by side.
+        let bundles = self.plants.par_chunks(InstructionSet::widest().lanes());
+        bundles.flat_map_iter(|plants| simulate_many(&self.runs(plants, params))).collect()
+    }
+
     /// One run on each plant. Costs one simulation of the scenario per plant.
     pub fn run(&self, params: &AicParams<N>) -> Vec<PlantResult> {
-        // As many plants at a time as run side by side.
-        self.plants
-            .par_chunks(InstructionSet::widest().lanes())
-            .flat_map_iter(|plants| {
-                let found = simulate_many(&self.runs(plants, params));
-                found.into_iter().zip(plants).map(|(metrics, (index, _))| PlantResult {
-                    plant: *index,
-                    outcome: score::of_run(&metrics, &self.start_rad, self.task.step_s),
-                    figures: score::figures(&metrics),
-                })
-            })
-            .collect()
+        let found = self.metrics(params);
+        let result = |(metrics, (index, _)): (Metrics, &(u64, Plant<N>))| PlantResult {
+            plant: *index,
+            outcome: self.scoring.of_run(&metrics),
+            figures: score::figures(&metrics),
+        };
+        found.into_iter().zip(&self.plants).map(result).collect()
     }
 
     /// What the plants say together, given up once that is known to be worse than `enough`: every half second of the task each bundle of plants writes down what its
-    /// runs cost at least, and all stop when the plants together cost too much, or one has diverged.
+    /// runs cost at least, and all stop when the plants together cost too much, or one has diverged or gone beyond a limit.
     ///
     /// Which thread sees it first depends on the hour; the answer does not, as whatever is worse than `enough` is answered alike.
     pub fn outcome(&self, params: &AicParams<N>, enough: Option<Finite>) -> Outcome {
         let Some(enough) = enough else {
-            return score::of_batch(self.run(params).iter().map(|plant| plant.outcome));
+            return self.scoring.of_batch(self.metrics(params).iter().map(|run| self.scoring.of_run(run)));
         };
-        let step_s = self.task.step_s;
-        let goal_steps: Vec<u64> = self.task.segments.iter().map(|segment| segment.steps).collect();
-        let every = ((LOOK_EVERY_S / step_s).round() as u64).max(1);
+        let every = ((LOOK_EVERY_S / self.task.step_s).round() as u64).max(1);
         let lanes = InstructionSet::widest().lanes();
-        let at_least_s = Mutex::new(vec![0.0; self.plants.len()]);
+        let at_least = Mutex::new(vec![0.0; self.plants.len()]);
         let stopped = AtomicBool::new(false);
         let bundle = |(place, plants): (usize, &[(u64, Plant<N>)])| {
             let mut go_on = |first: usize, found: &[Metrics]| {
-                let mut costs = at_least_s.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut costs = at_least.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut fails = false;
                 for (cost, metrics) in costs[place + first..].iter_mut().zip(found) {
-                    *cost = score::of_run_so_far_s(metrics, &self.start_rad, step_s, &goal_steps);
+                    match self.scoring.of_run_so_far(metrics) {
+                        Some(so_far) => *cost = so_far,
+                        None => fails = true,
+                    }
                 }
-                let diverged = found.iter().any(|metrics| metrics.diverged_at_s.is_some());
-                if diverged || score::of_batch_so_far_s(&costs) > enough.get() {
+                if fails || self.scoring.of_batch_so_far(&costs) > enough.get() {
                     stopped.store(true, Ordering::Relaxed);
                 }
                 !stopped.load(Ordering::Relaxed)
@@ -157,16 +181,16 @@ impl<const N: usize> Batch<N> {
             } else {
                 simulate_many_while(&self.runs(plants, params), every, &mut go_on)
             };
-            found.into_iter().map(|metrics| score::of_run(&metrics, &self.start_rad, step_s)).collect::<Vec<_>>()
+            found.into_iter().map(|metrics| self.scoring.of_run(&metrics)).collect::<Vec<_>>()
         };
-        // The worse half decides the cost, so nobody begins with the other before this one is done; but no thread idles.
-        let half = self.plants.len().div_ceil(2).next_multiple_of(lanes * rayon::current_num_threads());
+        // The hardest plants decide the cost, so nobody begins with the others before these are done; but no thread idles.
+        let first = lanes * rayon::current_num_threads();
         let mut outcomes: Vec<Outcome> = Vec::with_capacity(self.plants.len());
-        for (index, plants) in self.plants.chunks(half).enumerate() {
+        for (index, plants) in self.plants.chunks(first).enumerate() {
             let bundles = plants.par_chunks(lanes).enumerate();
-            outcomes.par_extend(bundles.flat_map_iter(|(at, plants)| bundle((index * half + at * lanes, plants))));
+            outcomes.par_extend(bundles.flat_map_iter(|(at, plants)| bundle((index * first + at * lanes, plants))));
         }
-        let outcome = score::of_batch(outcomes);
+        let outcome = self.scoring.of_batch(outcomes);
         if stopped.into_inner() || outcome > (Outcome::Simulated { cost: enough }) {
             return Outcome::Stopped { cost_above: enough };
         }
@@ -199,19 +223,33 @@ impl<const N: usize> Judge for Batch<N> {
             return Verdict { outcome: no_controller(), plants: Vec::new() };
         };
         let plants = self.run(&params);
-        Verdict { outcome: score::of_batch(plants.iter().map(|plant| plant.outcome)), plants }
+        Verdict { outcome: self.scoring.of_batch(plants.iter().map(|plant| plant.outcome)), plants }
     }
 }
 
-/// The objective of a search for gains of the active inference controller: the stability filter, then the batch.
-#[derive(Clone, Debug)]
-pub struct AicObjective<const N: usize> {
-    batch: Batch<N>,
-    filter: StabilityFilter<N>,
+/// Who proves figures: this room knows nothing of proofs.
+pub trait Prover: Sync {
+    /// The proved figures of `goals`, in their order, for the whole plant box; `None` when a proof fails.
+    fn figures(&self, gains: &Gains, goals: &[Goal]) -> Option<Vec<f64>>;
 }
 
-impl<const N: usize> AicObjective<N> {
-    /// The first `plants` plants of `seed`, behind a filter of `filter_samples` samples.
+/// Nobody proves anything.
+impl Prover for () {
+    fn figures(&self, _: &Gains, _: &[Goal]) -> Option<Vec<f64>> {
+        None
+    }
+}
+
+/// The objective of a search for gains of the active inference controller: the stability filter, then what is proved, then the batch, each only where a goal asks for it.
+#[derive(Clone)]
+pub struct AicObjective<'a, const N: usize> {
+    batch: Batch<N>,
+    filter: StabilityFilter<N>,
+    prover: &'a dyn Prover,
+}
+
+impl<const N: usize> AicObjective<'static, N> {
+    /// The settling cost on the first `plants` plants of `seed`, behind a filter of `filter_samples` samples.
     ///
     /// # Errors
     /// [`BatchError`] when there is no plant, or robot and scenario do not fit each other or `N`.
@@ -224,7 +262,15 @@ impl<const N: usize> AicObjective<N> {
     ) -> Result<Self, BatchError> {
         let batch = Batch::for_search(robot, scenario, seed, plants)?;
         let filter = StabilityFilter::new(robot, scenario, batch.task(), seed, filter_samples)?;
-        Ok(Self { batch, filter })
+        Ok(Self { batch, filter, prover: &() })
+    }
+}
+
+impl<const N: usize> AicObjective<'_, N> {
+    /// Other goals on the same plants, where `prover` answers those that are proved. Limits must be numbers: see [`Batch::resolved`].
+    #[must_use]
+    pub fn with_goals<'b>(self, goals: &Goals, prover: &'b dyn Prover) -> AicObjective<'b, N> {
+        AicObjective { batch: self.batch.with_goals(goals), filter: self.filter, prover }
     }
 
     /// The plants on which `gains` fare worst come first, so that a candidate that is not good enough is known soon. Outcomes do not change.
@@ -245,15 +291,59 @@ impl<const N: usize> AicObjective<N> {
     pub const fn filter(&self) -> &StabilityFilter<N> {
         &self.filter
     }
+
+    /// The figures of the goals that no run answers, or what becomes of gains without them.
+    fn unsimulated(&self, gains: &Gains, params: &AicParams<N>, growth_per_s: Finite) -> Result<Vec<(Goal, f64)>, Outcome> {
+        let goals = self.batch.scoring.goals();
+        let proved = goals.from(Source::Proved);
+        let mut figures = Vec::new();
+        if !proved.is_empty() {
+            // Where nothing is proved the slowest mode of the sample is what can be compared.
+            let refused = || Outcome::Uncertified { cost: Finite::saturating(-growth_per_s.get().recip()) };
+            let found = self.prover.figures(gains, &proved).ok_or_else(refused)?;
+            figures.extend(proved.into_iter().zip(found));
+        }
+        for goal in goals.from(Source::Linearised) {
+            figures.push((goal, self.filter.delay_margin_s(params, self.batch.task.step_s)));
+        }
+        Ok(figures)
+    }
 }
 
-impl<const N: usize> Objective for AicObjective<N> {
+impl<const N: usize> Objective for AicObjective<'_, N> {
     fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
         let Some(params) = self.batch.params(gains) else { return no_controller() };
         let growth_per_s = self.filter.growth_per_s(&params);
         if growth_per_s.get() >= 0.0 {
             return Outcome::Unstable { abscissa_per_s: growth_per_s };
         }
-        self.batch.outcome(&params, enough)
+        let figures = match self.unsimulated(gains, &params, growth_per_s) {
+            Ok(figures) => figures,
+            Err(refused) => return refused,
+        };
+        let goals = self.batch.scoring.goals();
+        let figure = |goal: Goal| figures.iter().find(|(other, _)| *other == goal).map(|(_, figure)| *figure);
+        let mut excess = Excess::default();
+        for (goal, bound) in goals.limits_from(Source::Proved).chain(goals.limits_from(Source::Linearised)) {
+            excess.add(goal, figure(goal).unwrap_or(0.0), bound);
+        }
+        let found = figure(goals.objective).map(|figure| {
+            let cost = goals.objective.cost(figure);
+            match goals.objective.source() {
+                Source::Proved => Outcome::Certified { cost },
+                Source::Simulated | Source::Linearised => Outcome::Simulated { cost },
+            }
+        });
+        match (found, enough) {
+            (Some(found), _) if goals.from(Source::Simulated).is_empty() => excess.judge(found),
+            (None, Some(enough)) if excess.is_any() => Outcome::Stopped { cost_above: enough },
+            (found, enough) => {
+                let simulated = self.batch.outcome(&params, if found.is_some() { None } else { enough });
+                excess.judge(match (simulated, found) {
+                    (Outcome::Simulated { .. }, Some(found)) => found,
+                    _ => simulated,
+                })
+            }
+        }
     }
 }

@@ -13,7 +13,7 @@
 //!
 //! Limits: a sample proves nothing between its points. Cost: two eigenvalue problems of order 6N each.
 
-use certune_closed_loop::{PlantBox, PlantError, PlantSetting, Scenario, Task, linearise_aic, linearise_aic_sampled};
+use certune_closed_loop::{MAX_DELAY_SAMPLES, PlantBox, PlantError, PlantSetting, Scenario, Task, linearise_aic, linearise_aic_sampled};
 use certune_control::aic::AicParams;
 use certune_dynamics::{Model, Robot};
 use certune_linsys::Joints;
@@ -85,6 +85,19 @@ impl<const N: usize> StabilityFilter<N> {
     /// Whether the sample is empty; then nothing is ever rejected.
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
+    }
+
+    /// The longest delay, in whole samples of the controller, up to which every sampled loop decays, s; from the box's largest delay on, 0 when it is not borne, and
+    /// at most [`MAX_DELAY_SAMPLES`].
+    pub fn delay_margin_s(&self, params: &AicParams<N>, step_s: f64) -> f64 {
+        let margin = |FilterSample { model, q }: &FilterSample<N>| {
+            let decays = |delay: &usize| {
+                linearise_aic_sampled(model, q, params, self.gravity_compensation, *delay)
+                    .is_ok_and(|found| found.decay_per_s() > 0.0)
+            };
+            (self.delay_samples..=MAX_DELAY_SAMPLES).take_while(decays).last().unwrap_or(0)
+        };
+        self.samples.par_iter().map(margin).min().unwrap_or(MAX_DELAY_SAMPLES) as f64 * step_s
     }
 
     /// The largest growth rate over the sample, 1/s: negative when every loop decays. A loop that overflows grows as fast as a number can.

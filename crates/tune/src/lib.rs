@@ -8,6 +8,7 @@
 pub mod batch;
 pub mod filter;
 mod gains;
+pub mod goals;
 pub mod outcome;
 pub mod record;
 pub mod score;
@@ -16,13 +17,14 @@ pub mod space;
 pub mod streams;
 pub mod tune;
 
-pub use batch::{AicObjective, Batch, BatchError};
+pub use batch::{AicObjective, Batch, BatchError, Prover};
 pub use filter::StabilityFilter;
 pub use gains::{Gain, Gains, NotShared};
+pub use goals::{Bound, Excess, Goal, GoalError, Goals, Limit, Reference, Source};
 pub use outcome::{Finite, NotFinite, Outcome};
 pub use record::{Attempt, Figures, HeldOut, PlantResult, Question, RunRecord, Sensitivity, Verdict};
 pub use search::{
     Candidate, Evaluation, Objective, Phase, Progress, SearchError, SearchRun, SearchSettings, Termination, search,
 };
-pub use space::{Freedom, Method, ObjectiveName, Range, Scale, Space, SpaceError};
+pub use space::{Freedom, Method, Range, Scale, Space, SpaceError};
 pub use tune::{Bench, Judge, Stage, TuneError, TuneProgress, Tuned, tune};

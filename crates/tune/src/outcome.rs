@@ -1,14 +1,14 @@
 //! What became of a candidate, and which of two fates is better.
 //!
 //! ```text
-//! Certified(cost) < Simulated(cost) < Stopped(cost) < Uncertified(cost) < Unstable(abscissa) < Diverged(time)
+//! Certified(cost) < Simulated(cost) < Stopped(cost) < Violates(excess) < Uncertified(cost) < Unstable(abscissa) < Diverged(time)
 //! ```
 //!
 //! The order is total: within a rank a lower cost, a smaller abscissa or a *later* divergence is better, and every number is
 //! [`Finite`], so that no comparison meets NaN. A failure is never a cost with a penalty added, since a penalty has a size that somebody must
 //! choose and a good candidate can be beaten by it.
 //!
-//! A solver of argmin compares `f64`. [`Outcome::score`] embeds the order in the interval `[0, 6)`: rank `r` occupies `[r, r + 1)`,
+//! A solver of argmin compares `f64`. [`Outcome::score`] embeds the order in the interval `[0, 7)`: rank `r` occupies `[r, r + 1)`,
 //! and inside a rank the 64 bits of a finite number, read as an integer that increases with the number, are divided by 2^64. That
 //! scale is piecewise logarithmic, one octave per 2^-12, so it separates costs by their ratio:
 //! - it never reverses the order of two outcomes;
@@ -19,6 +19,8 @@
 use core::cmp::Ordering;
 
 use serde::{Deserialize, Serialize};
+
+use crate::goals::Goal;
 
 /// A number that is neither NaN nor infinite, hence totally ordered.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -119,6 +121,13 @@ pub enum Outcome {
         /// The batch costs more than this, or has none.
         cost_above: Finite,
     },
+    /// Beyond a limit of [`Goals`](crate::goals::Goals).
+    Violates {
+        /// By how much: the sum over the limits of the share by which they are passed.
+        excess: Finite,
+        /// The limit that is passed the furthest.
+        limit: Goal,
+    },
     /// Finished the task, or stable in the sample, but the certificate was refused.
     Uncertified {
         /// Cost as before; when the objective is a certified figure, the time constant of the slowest sampled mode, s.
@@ -143,9 +152,10 @@ impl Outcome {
             Self::Certified { .. } => 0,
             Self::Simulated { .. } => 1,
             Self::Stopped { .. } => 2,
-            Self::Uncertified { .. } => 3,
-            Self::Unstable { .. } => 4,
-            Self::Diverged { .. } => 5,
+            Self::Violates { .. } => 3,
+            Self::Uncertified { .. } => 4,
+            Self::Unstable { .. } => 5,
+            Self::Diverged { .. } => 6,
         }
     }
 
@@ -154,12 +164,13 @@ impl Outcome {
         match self {
             Self::Certified { cost } | Self::Simulated { cost } | Self::Uncertified { cost } => cost.key(),
             Self::Stopped { cost_above } => cost_above.key(),
+            Self::Violates { excess, .. } => excess.key(),
             Self::Unstable { abscissa_per_s } => abscissa_per_s.key(),
             Self::Diverged { at_s } => !at_s.key(),
         }
     }
 
-    /// The place of the outcome on a line, in `[0, 6)`, lower is better: see the [module](self).
+    /// The place of the outcome on a line, in `[0, 7)`, lower is better: see the [module](self).
     pub fn score(self) -> f64 {
         f64::from(self.rank()) + self.key() as f64 * KEY_UNIT
     }
@@ -178,7 +189,7 @@ impl Outcome {
     pub const fn cost(self) -> Option<f64> {
         match self {
             Self::Certified { cost } | Self::Simulated { cost } | Self::Uncertified { cost } => Some(cost.get()),
-            Self::Stopped { .. } | Self::Unstable { .. } | Self::Diverged { .. } => None,
+            Self::Stopped { .. } | Self::Violates { .. } | Self::Unstable { .. } | Self::Diverged { .. } => None,
         }
     }
 }
@@ -217,12 +228,13 @@ mod tests {
     }
 
     fn outcome() -> impl Strategy<Value = Outcome> {
-        (0..6, number()).prop_map(|(rank, x)| match rank {
+        (0..7, number()).prop_map(|(rank, x)| match rank {
             0 => Outcome::Certified { cost: x },
             1 => Outcome::Simulated { cost: x },
             2 => Outcome::Stopped { cost_above: x },
-            3 => Outcome::Uncertified { cost: x },
-            4 => Outcome::Unstable { abscissa_per_s: x },
+            3 => Outcome::Violates { excess: x, limit: Goal::Overshoot },
+            4 => Outcome::Uncertified { cost: x },
+            5 => Outcome::Unstable { abscissa_per_s: x },
             _ => Outcome::Diverged { at_s: x },
         })
     }
@@ -244,7 +256,7 @@ mod tests {
 
         #[test]
         fn the_score_never_reverses_the_order(a in outcome(), b in outcome()) {
-            prop_assert!((0.0..6.0).contains(&a.score()));
+            prop_assert!((0.0..7.0).contains(&a.score()));
             if a < b {
                 prop_assert!(a.score() <= b.score(), "{a:?} {b:?}");
             }

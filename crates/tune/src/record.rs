@@ -9,10 +9,11 @@ use serde::{Deserialize, Serialize};
 use crate::gains::{Gain, Gains};
 use crate::outcome::Outcome;
 use crate::search::{Evaluation, SearchSettings, Termination};
-use crate::space::{Freedom, ObjectiveName, Space};
+use crate::goals::Goals;
+use crate::space::{Freedom, Space};
 
 /// The version of the record that this crate writes.
-pub const RECORD_SCHEMA: u32 = 3;
+pub const RECORD_SCHEMA: u32 = 4;
 
 /// What was asked, in names and numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,8 +27,8 @@ pub struct Question {
     pub scenario: String,
     /// Names and versions of the programs and libraries that took part.
     pub versions: BTreeMap<String, String>,
-    /// What the search minimises or maximises.
-    pub objective: ObjectiveName,
+    /// What the search is after and what it must keep.
+    pub goals: Goals,
     /// The search.
     pub search: SearchSettings,
     /// Plants on which every candidate is simulated.
@@ -84,6 +85,10 @@ pub struct Figures {
     pub peak_torque_n_m: Option<f64>,
     /// Jitter: the largest root mean square of a torque's rate.
     pub torque_rate_rms_n_m_per_s: Option<f64>,
+    /// Integral of time times absolute error, summed over segments and joints.
+    pub itae_rad_s2: Option<f64>,
+    /// Mechanical work of the motors, given and taken, summed over segments and joints.
+    pub energy_j: Option<f64>,
     /// Steps with a torque at its limit, summed over segments and joints.
     pub saturated_steps: u64,
 }

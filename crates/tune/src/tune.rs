@@ -178,7 +178,10 @@ fn take_best(run: &mut SearchRun, waiting: &mut Vec<usize>, objective: &dyn Obje
             let (number, is_exact) = match run.evaluations[index].outcome {
                 Outcome::Certified { cost } | Outcome::Simulated { cost } => (cost, true),
                 Outcome::Stopped { cost_above } => (cost_above, false),
-                Outcome::Uncertified { .. } | Outcome::Unstable { .. } | Outcome::Diverged { .. } => return None,
+                Outcome::Violates { .. }
+                | Outcome::Uncertified { .. }
+                | Outcome::Unstable { .. }
+                | Outcome::Diverged { .. } => return None,
             };
             Some((number, is_exact, index))
         };

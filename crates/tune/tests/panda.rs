@@ -8,7 +8,7 @@ use certune_control::aic::AicParams;
 use certune_dynamics::Robot;
 use certune_tune::filter::DEFAULT_SAMPLES;
 use certune_tune::{
-    AicObjective, Batch, BatchError, Bench, Finite, Gain, Gains, Judge, Method, Objective, ObjectiveName, Outcome,
+    AicObjective, Batch, BatchError, Bench, Finite, Gain, Gains, Goals, Judge, Method, Objective, Outcome,
     Question, SearchSettings, Space, tune,
 };
 
@@ -172,7 +172,7 @@ fn run(method: Method, threads: usize, stop_early: bool) -> certune_tune::RunRec
         robot_sha256: robot.sha256(),
         scenario: scenario.name.clone(),
         versions: BTreeMap::new(),
-        objective: ObjectiveName::SettlingCost,
+        goals: Goals::default(),
         search: SearchSettings { particles: 6, stop_early, ..SearchSettings::new(method, 36, 5) },
         batch_plants: 2,
         held_out_plants: 3,

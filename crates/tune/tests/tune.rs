@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use certune_tune::{
-    Bench, Evaluation, Finite, Freedom, Gain, Gains, Judge, Method, ObjectiveName, Outcome, Progress, Question, Range,
+    Bench, Evaluation, Finite, Freedom, Gain, Gains, Goals, Judge, Method, Outcome, Progress, Question, Range,
     RunRecord, Scale, SearchSettings, Space, Stage, TuneError, TuneProgress, Tuned, Verdict, tune,
 };
 
@@ -52,7 +52,7 @@ fn question(method: Method, attempts: usize) -> Question {
         robot_sha256: "00".to_owned(),
         scenario: "pick-and-place".to_owned(),
         versions: BTreeMap::from([("autotune".to_owned(), "0.1.0".to_owned())]),
-        objective: ObjectiveName::SettlingCost,
+        goals: Goals::default(),
         search: SearchSettings::new(method, 60, 3),
         batch_plants: 1,
         held_out_plants: 1,

@@ -7,7 +7,7 @@
 //! | `request` | what is asked of a certifier, and which claims a controller can have |
 //! | `gains` | gains of either controller, as a certificate writes them |
 //! | `counterexample`, `growth` | for a refusal: an unstable member of the family, and a simulation that shows it |
-//! | `objective` | a certified figure as the objective of a search |
+//! | `objective` | certified figures as goals of a search |
 //! | `poles` | a map of poles |
 //! | `proving` | the constants of an arm, proved and written as a record |
 
@@ -33,7 +33,6 @@ pub use arm::ArmCertifier;
 pub use constants::Over;
 pub use gains::ArmGains;
 pub use growth::{Growth, growth};
-pub use objective::CertifiedObjective;
 pub use poles::poles_per_s;
 pub use proving::{ProvingEffort, ProvingTask, prove_constants};
 pub use request::{Answer, Effort, Request, TorqueLimits, claims_for};

@@ -1,74 +1,35 @@
-//! A certified figure as the objective of a search.
+//! Certified figures as goals of a search.
 //!
-//! A candidate goes through the stability filter first (linearised loops, continuous and sampled, on a fixed sample), so that a search for the best
-//! continuous-time figure does not end at gains that no sampled controller can have. What passes is certified; the cost is the inverse of the
-//! certified figure. The figure is the checked one: slack that a solver leaves in its answer is worth nothing here.
+//! The figure is the checked one: slack that a solver leaves in its answer is worth nothing here.
 
-use certune_closed_loop::Scenario;
-use certune_control::aic::AicParams;
-use certune_dynamics::Robot;
-use certune_tune::{BatchError, Finite, Gains, Objective, ObjectiveName, Outcome, StabilityFilter};
+use certune_tune::{Gains, Goal, Prover};
 use certune_verify::{Certificate, ClaimKind, Verdict};
 
 use super::arm::ArmCertifier;
 
-/// The largest certified rate or radius, as an objective.
-#[derive(Debug)]
-pub struct CertifiedObjective<'a, const N: usize> {
-    certifier: &'a ArmCertifier<N>,
-    filter: StabilityFilter<N>,
-    step_s: f64,
-    claim: ClaimKind,
-    figure: &'static str,
-}
-
-impl<'a, const N: usize> CertifiedObjective<'a, N> {
-    /// The objective of that name, on the certifier's family; `None` for the settling cost, which is simulated.
-    ///
-    /// # Errors
-    /// [`BatchError`] when robot and scenario do not fit each other or `N`.
-    pub fn new(
-        name: ObjectiveName,
-        certifier: &'a ArmCertifier<N>,
-        (robot, scenario): (&Robot, &Scenario),
-        seed: u64,
-        filter_samples: usize,
-    ) -> Result<Option<Self>, BatchError> {
-        let (claim, figure) = match name {
-            ObjectiveName::SettlingCost => return Ok(None),
-            ObjectiveName::CertifiedRate => (ClaimKind::Exponential, "rate"),
-            ObjectiveName::CertifiedRadius => (ClaimKind::Region, "radius"),
-        };
-        let task = scenario.bind(robot)?;
-        let filter = StabilityFilter::new(robot, scenario, &task, seed, filter_samples)?;
-        Ok(Some(Self { certifier, filter, step_s: task.step_s, claim, figure }))
-    }
-
-    /// The certified figure, if the claim holds.
-    fn certified(&self, certificate: &Certificate) -> Option<f64> {
-        let entries = certificate.document().claims.iter().zip(certificate.checked());
-        let holding = |verdict| verdict == Verdict::Holds;
-        let found = entries.filter(|(entry, checked)| holding(checked.verdict) && entry.claim.kind() == self.claim);
-        let mut figures = found.flat_map(|(entry, _)| entry.claim.figures());
-        figures.find(|figure| figure.name == self.figure).map(|figure| figure.value.to_f64())
+/// The claim that proves a goal, and the name of the figure in it; none for a goal that is not proved.
+const fn claim_of(goal: Goal) -> Option<(ClaimKind, &'static str)> {
+    match goal {
+        Goal::CertifiedRate => Some((ClaimKind::Exponential, "rate")),
+        Goal::CertifiedRadius => Some((ClaimKind::Region, "radius")),
+        _ => None,
     }
 }
 
-impl<const N: usize> Objective for CertifiedObjective<'_, N> {
-    // A certificate is all or nothing: it cannot be given up half way.
-    fn evaluate(&self, gains: &Gains, _: Option<Finite>) -> Outcome {
-        let gains = gains.on_every_joint();
-        let Ok(params) = AicParams::new(&gains, self.step_s) else {
-            return Outcome::Diverged { at_s: Finite::saturating(0.0) };
-        };
-        let growth_per_s = self.filter.growth_per_s(&params);
-        if growth_per_s.get() >= 0.0 {
-            return Outcome::Unstable { abscissa_per_s: growth_per_s };
-        }
-        let certificate = self.certifier.certify(&gains, &[self.claim]);
-        match certificate.ok().and_then(|certificate| self.certified(&certificate)) {
-            Some(figure) => Outcome::Certified { cost: Finite::saturating(figure.recip()) },
-            None => Outcome::Uncertified { cost: Finite::saturating(-growth_per_s.get().recip()) },
-        }
+/// The figure of that name in a claim that holds.
+fn figure(certificate: &Certificate, (claim, name): (ClaimKind, &'static str)) -> Option<f64> {
+    let entries = certificate.document().claims.iter().zip(certificate.checked());
+    let found = entries.filter(|(entry, checked)| checked.verdict == Verdict::Holds && entry.claim.kind() == claim);
+    let mut figures = found.flat_map(|(entry, _)| entry.claim.figures());
+    figures.find(|figure| figure.name == name).map(|figure| figure.value.to_f64())
+}
+
+impl<const N: usize> Prover for ArmCertifier<N> {
+    fn figures(&self, gains: &Gains, goals: &[Goal]) -> Option<Vec<f64>> {
+        let claims: Vec<(ClaimKind, &'static str)> = goals.iter().map(|goal| claim_of(*goal)).collect::<Option<_>>()?;
+        let mut kinds: Vec<ClaimKind> = claims.iter().map(|(kind, _)| *kind).collect();
+        kinds.dedup();
+        let certificate = self.certify(&gains.on_every_joint(), &kinds).ok()?;
+        claims.into_iter().map(|claim| figure(&certificate, claim)).collect()
     }
 }

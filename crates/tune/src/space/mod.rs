@@ -20,7 +20,11 @@
 //! [search]
 //! method = "schedule"                 # or "cma-es", "nelder-mead", "particle-swarm"
 //! start = "pezzato2020-simulation"    # optional: a preset
-//! objective = "settling-cost"         # optional: or "certified-rate", "certified-radius"
+//! objective = "settling-cost"         # optional, see `goals`
+//! cvar = 0.9                          # optional, see `goals`
+//!
+//! [limits]                            # optional, see `goals`
+//! overshoot = 0.02
 //!
 //! [fixed]
 //! sigma_q = 1.0
@@ -44,6 +48,8 @@
 //! scale = "log"
 //! ```
 //!
+//! Objective and limits are explained in [`goals`](crate::goals).
+//!
 //! Every gain is either fixed or free, never both, never neither. The kappas and sigmas have one redundant direction ([`Gains::rescaled`]), so at
 //! least one of them must be fixed.
 
@@ -53,6 +59,7 @@ use certune_closed_loop::file::{FileError, KeyError, Location, Problem, read_tex
 use serde::{Deserialize, Serialize};
 
 use crate::gains::{Gain, Gains};
+use crate::goals::{Bound, Goal, GoalError, Goals, Limit};
 
 /// The version of the file that this crate reads.
 pub const SPACE_SCHEMA: i64 = 1;
@@ -74,6 +81,9 @@ pub enum SpaceError {
         /// What is wrong there.
         problem: Box<SpaceError>,
     },
+    /// Goals that make no sense.
+    #[error(transparent)]
+    Goals(#[from] GoalError),
     /// A controller that this crate cannot tune yet.
     #[error(
         "controller = \"mrac\": gains of the model-reference controller can be simulated but not tuned yet; expected \"aic\""
@@ -156,6 +166,7 @@ impl SpaceError {
     fn key(&self) -> String {
         match self {
             Self::File(FileError { location, .. }) | Self::At { location, .. } => location.key.clone(),
+            Self::Goals(error) => error.key(),
             Self::MracNotTunable => "controller".to_owned(),
             Self::Fixed { gain, .. } => format!("fixed.{gain}"),
             Self::Twice { gain } | Self::Bounds { gain, .. } | Self::Inverted { gain, .. } => format!("gains.{gain}"),
@@ -178,33 +189,6 @@ pub enum Method {
     NelderMead,
     /// A particle swarm over the whole box: a cold start.
     ParticleSwarm,
-}
-
-/// What a search is after.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ObjectiveName {
-    /// The least settling cost over simulated plants; its unit is s.
-    #[default]
-    SettlingCost,
-    /// The largest certified decay rate of the linearised loops; the cost is its inverse, s.
-    CertifiedRate,
-    /// The largest certified radius of the nonlinear loop; the cost is its inverse, 1/rad.
-    CertifiedRadius,
-}
-
-impl ObjectiveName {
-    /// Every objective.
-    pub const ALL: [Self; 3] = [Self::SettlingCost, Self::CertifiedRate, Self::CertifiedRadius];
-
-    /// The name as it is written in files and flags.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::SettlingCost => "settling-cost",
-            Self::CertifiedRate => "certified-rate",
-            Self::CertifiedRadius => "certified-radius",
-        }
-    }
 }
 
 /// On which scale a gain moves evenly.
@@ -299,7 +283,47 @@ struct FileSearch {
     method: Method,
     start: Option<String>,
     #[serde(default)]
-    objective: ObjectiveName,
+    objective: Goal,
+    cvar: Option<f64>,
+}
+
+/// [`Goal::key`] by [`Goal::key`], so that an unknown key is refused by its name.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FileLimits {
+    settling_cost_s: Option<Bound>,
+    settling_time_s: Option<Bound>,
+    final_error_rad: Option<Bound>,
+    itae_rad_s2: Option<Bound>,
+    overshoot: Option<Bound>,
+    torque_rate_rms_n_m_per_s: Option<Bound>,
+    peak_torque_n_m: Option<Bound>,
+    energy_j: Option<Bound>,
+    certified_rate_per_s: Option<Bound>,
+    certified_radius_rad: Option<Bound>,
+    delay_margin_s: Option<Bound>,
+}
+
+impl FileLimits {
+    const fn get(&self, goal: Goal) -> Option<Bound> {
+        match goal {
+            Goal::SettlingCost => self.settling_cost_s,
+            Goal::SettlingTime => self.settling_time_s,
+            Goal::FinalError => self.final_error_rad,
+            Goal::Itae => self.itae_rad_s2,
+            Goal::Overshoot => self.overshoot,
+            Goal::Jitter => self.torque_rate_rms_n_m_per_s,
+            Goal::PeakTorque => self.peak_torque_n_m,
+            Goal::Energy => self.energy_j,
+            Goal::CertifiedRate => self.certified_rate_per_s,
+            Goal::CertifiedRadius => self.certified_radius_rad,
+            Goal::DelayMargin => self.delay_margin_s,
+        }
+    }
+
+    fn all(&self) -> Vec<Limit> {
+        Goal::ALL.into_iter().filter_map(|goal| Some(Limit { goal, bound: self.get(goal)? })).collect()
+    }
 }
 
 #[derive(Deserialize)]
@@ -307,6 +331,8 @@ struct FileSearch {
 struct File {
     controller: FileController,
     search: FileSearch,
+    #[serde(default)]
+    limits: FileLimits,
     fixed: PerGain<f64>,
     gains: PerGain<Range>,
 }
@@ -326,7 +352,7 @@ pub enum Freedom {
 pub struct Space {
     method: Method,
     start: Option<String>,
-    objective: ObjectiveName,
+    goals: Goals,
     /// In the order of [`Gain::ALL`].
     freedoms: [Freedom; 7],
 }
@@ -358,8 +384,14 @@ impl Space {
                 (None, None) => return Err(SpaceError::Missing { gain }),
             };
         }
-        let objective = file.search.objective;
-        Self::new(file.search.method, file.search.start, freedoms).map(|space| Self { objective, ..space })
+        let default = Goals::default();
+        let goals = Goals {
+            objective: file.search.objective,
+            cvar: file.search.cvar.unwrap_or(default.cvar),
+            limits: file.limits.all(),
+        };
+        goals.validate()?;
+        Self::new(file.search.method, file.search.start, freedoms).map(|space| Self { goals, ..space })
     }
 
     /// A space from its parts, `freedoms` in the order of [`Gain::ALL`].
@@ -389,7 +421,7 @@ impl Space {
         if scaled.clone().all(|(_, freedom)| free(freedom)) {
             return Err(SpaceError::Redundant);
         }
-        Ok(Self { method, start, objective: ObjectiveName::default(), freedoms })
+        Ok(Self { method, start, goals: Goals::default(), freedoms })
     }
 
     /// The method that the file asks for.
@@ -403,9 +435,9 @@ impl Space {
         Self { method, ..self }
     }
 
-    /// What the file asks the search to be after; the settling cost unless it says otherwise.
-    pub const fn objective(&self) -> ObjectiveName {
-        self.objective
+    /// What the search is after and what it must keep; the settling cost and no limits unless the file says otherwise.
+    pub const fn goals(&self) -> &Goals {
+        &self.goals
     }
 
     /// The name of the preset at which the search starts.
