@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use certune::TorqueLimits;
-use certune::tune::ObjectiveName;
+use certune::tune::Goal;
 use certune::verify::ClaimKind;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
@@ -115,9 +115,10 @@ pub struct TuneArgs {
     /// Scenario by name or TOML file [default: pick-and-place; for a URDF file a generic one]
     #[arg(long, value_name = "NAME|FILE")]
     pub scenario: Option<String>,
-    /// What the search is after [default: as the search space says, or settling-cost]
-    #[arg(long, value_name = "settling-cost|certified-rate|certified-radius", value_parser = objective)]
-    pub objective: Option<ObjectiveName>,
+    /// What the search is after: settling-cost, settling-time, final-error, itae, overshoot, jitter, peak-torque, energy, certified-rate, certified-radius or
+    /// delay-margin [default: as the search space says, or settling-cost]
+    #[arg(long, value_name = "GOAL", value_parser = objective)]
+    pub objective: Option<Goal>,
     /// Candidates to evaluate [default: 300]
     #[arg(long, value_name = "N")]
     pub budget: Option<usize>,

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::time::{Duration, Instant};
 
-use certune::tune::{Evaluation, ObjectiveName, Outcome, Progress, Stage, TuneProgress};
+use certune::tune::{Evaluation, Goal, Outcome, Progress, Source, Stage, TuneProgress};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
 use crate::output;
@@ -19,18 +19,18 @@ const SHARES: u64 = 1000;
 pub struct Terminal {
     bar: ProgressBar,
     verbose: bool,
-    objective: ObjectiveName,
+    objective: Goal,
     began: Instant,
 }
 
 impl Terminal {
     pub fn new(verbose: bool) -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-        Self { bar, verbose, objective: ObjectiveName::SettlingCost, began: Instant::now() }
+        Self { bar, verbose, objective: Goal::SettlingCost, began: Instant::now() }
     }
 
     /// The same for a search after another objective than the settling cost.
-    pub fn after(self, objective: ObjectiveName) -> Self {
+    pub fn after(self, objective: Goal) -> Self {
         Self { objective, ..self }
     }
 
@@ -89,22 +89,30 @@ fn style(template: &str) -> ProgressStyle {
 }
 
 /// What a cost means.
-pub fn achieved(cost: f64, objective: ObjectiveName) -> String {
+pub fn achieved(cost: f64, objective: Goal) -> String {
+    let figure = objective.figure(cost);
     match objective {
-        ObjectiveName::SettlingCost => format!("cost {cost:.4} s"),
-        ObjectiveName::CertifiedRate => format!("rate {:.3} /s", cost.recip()),
-        ObjectiveName::CertifiedRadius => format!("radius {:.4} rad", cost.recip()),
+        Goal::SettlingCost => format!("cost {figure:.4} s"),
+        Goal::Overshoot => format!("overshoot {:.3} %", 100.0 * figure),
+        _ => format!("{} {figure:.4} {}", objective.name().replace('-', " "), objective.unit()),
     }
 }
 
 /// An outcome in words.
-fn in_words(outcome: Outcome, objective: ObjectiveName) -> String {
+fn in_words(outcome: Outcome, objective: Goal) -> String {
     match outcome {
         Outcome::Certified { cost } => format!("certified, {}", achieved(cost.get(), objective)),
         Outcome::Simulated { cost } => achieved(cost.get(), objective),
         Outcome::Stopped { cost_above } => format!("given up above {}", achieved(cost_above.get(), objective)),
-        Outcome::Uncertified { cost } if objective == ObjectiveName::SettlingCost => {
+        Outcome::Uncertified { cost } if objective.source() != Source::Proved => {
             format!("not certified, {}", achieved(cost.get(), objective))
+        }
+        Outcome::Violates { excess, limit } => {
+            format!(
+                "beyond the limit of {} (all limits together by {:.1} %)",
+                limit.name().replace('-', " "),
+                100.0 * excess.get()
+            )
         }
         Outcome::Uncertified { .. } => "not certified".to_owned(),
         Outcome::Unstable { abscissa_per_s } => format!("unstable, grows at {:.3} /s", abscissa_per_s.get()),

@@ -3,7 +3,7 @@
 use certune::TorqueLimits;
 use certune::closed_loop::file::nearest;
 use certune::closed_loop::simulate::MAX_DELAY_SAMPLES;
-use certune::tune::ObjectiveName;
+use certune::tune::Goal;
 use certune::verify::ClaimKind;
 
 /// A closed interval of numbers that are not negative.
@@ -68,9 +68,9 @@ pub fn plants(text: &str) -> Result<usize, String> {
 }
 
 /// An objective by its name.
-pub fn objective(text: &str) -> Result<ObjectiveName, String> {
-    let names = || ObjectiveName::ALL.iter().map(|objective| objective.name());
-    ObjectiveName::ALL.into_iter().find(|objective| objective.name() == text).ok_or_else(|| {
+pub fn objective(text: &str) -> Result<Goal, String> {
+    let names = || Goal::ALL.iter().map(|objective| objective.name());
+    Goal::ALL.into_iter().find(|objective| objective.name() == text).ok_or_else(|| {
         let meant = nearest(text, names()).map(|nearest| format!("did you mean `{nearest}`? ")).unwrap_or_default();
         format!("no such objective; {meant}the objectives are {}", names().collect::<Vec<_>>().join(", "))
     })

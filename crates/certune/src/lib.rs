@@ -65,6 +65,6 @@ mod stability;
 
 pub use adaptive::AdaptiveSetting;
 pub use stability::{
-    Answer, ArmCertifier, ArmGains, Effort, Growth, Over, ProvingEffort, ProvingTask, Request,
-    StabilityError, TorqueLimits, certificate_text, claims_for, family_of, growth, poles_per_s, prove_constants,
+    Answer, ArmCertifier, ArmGains, Effort, Growth, Over, ProvingEffort, ProvingTask, Request, StabilityError,
+    TorqueLimits, certificate_text, claims_for, family_of, growth, poles_per_s, prove_constants,
 };

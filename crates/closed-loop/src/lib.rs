@@ -63,8 +63,8 @@ pub use metrics::{Metrics, Segment};
 pub use plant_box::{PlantBox, PlantError, PlantSetting};
 pub use scenario::Scenario;
 pub use simulate::{
-    Bundle, MAX_DELAY_SAMPLES, NoiseStream, Plant, Progress, Recorder, Run, Sample, Simulation, simulate, simulate_many, simulate_many_on,
-    simulate_many_while,
+    Bundle, MAX_DELAY_SAMPLES, NoiseStream, Plant, Progress, Recorder, Run, Sample, Simulation, simulate,
+    simulate_many, simulate_many_on, simulate_many_while,
 };
 pub use task::Task;
 pub use trajectory::{AicDiagnostics, Row, Trajectory, aic_diagnostics};

@@ -293,7 +293,12 @@ impl<const N: usize> AicObjective<'_, N> {
     }
 
     /// The figures of the goals that no run answers, or what becomes of gains without them.
-    fn unsimulated(&self, gains: &Gains, params: &AicParams<N>, growth_per_s: Finite) -> Result<Vec<(Goal, f64)>, Outcome> {
+    fn unsimulated(
+        &self,
+        gains: &Gains,
+        params: &AicParams<N>,
+        growth_per_s: Finite,
+    ) -> Result<Vec<(Goal, f64)>, Outcome> {
         let goals = self.batch.scoring.goals();
         let proved = goals.from(Source::Proved);
         let mut figures = Vec::new();

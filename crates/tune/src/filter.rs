@@ -13,7 +13,9 @@
 //!
 //! Limits: a sample proves nothing between its points. Cost: two eigenvalue problems of order 6N each.
 
-use certune_closed_loop::{MAX_DELAY_SAMPLES, PlantBox, PlantError, PlantSetting, Scenario, Task, linearise_aic, linearise_aic_sampled};
+use certune_closed_loop::{
+    MAX_DELAY_SAMPLES, PlantBox, PlantError, PlantSetting, Scenario, Task, linearise_aic, linearise_aic_sampled,
+};
 use certune_control::aic::AicParams;
 use certune_dynamics::{Model, Robot};
 use certune_linsys::Joints;

@@ -98,7 +98,7 @@ impl Goal {
             Self::SettlingTime => ["settling-time", "settling_time_s", "s"],
             Self::FinalError => ["final-error", "final_error_rad", "rad"],
             Self::Itae => ["itae", "itae_rad_s2", "rad s²"],
-            Self::Overshoot => ["overshoot", "overshoot", "of the step"],
+            Self::Overshoot => ["overshoot", "overshoot", "1"],
             Self::Jitter => ["jitter", "torque_rate_rms_n_m_per_s", "N m/s"],
             Self::PeakTorque => ["peak-torque", "peak_torque_n_m", "N m"],
             Self::Energy => ["energy", "energy_j", "J"],
@@ -161,6 +161,22 @@ impl Goal {
     pub fn excess(self, figure: f64, bound: f64) -> f64 {
         (if self.is_at_least() { bound / figure } else { figure / bound }) - 1.0
     }
+}
+
+impl core::fmt::Display for Limit {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let unit = if self.goal == Goal::Overshoot { "" } else { self.goal.unit() };
+        let side = if self.goal.is_at_least() { "at least" } else { "at most" };
+        match self.bound {
+            Bound::At(bound) => write!(f, "{} {side} {} {unit}", self.goal.name().replace('-', " "), short(bound)),
+            Bound::Of(Reference::Start) => write!(f, "{} {side} the start's", self.goal.name().replace('-', " ")),
+        }
+    }
+}
+
+/// Four significant digits, without the zeros of a format.
+fn short(number: f64) -> f64 {
+    format!("{number:.3e}").parse().unwrap_or(number)
 }
 
 impl core::fmt::Display for Goal {
@@ -277,6 +293,15 @@ impl Goals {
             }
         }
         Ok(())
+    }
+
+    /// The goals by which plants alone can judge: the settling cost takes the place of an objective that no run answers.
+    #[must_use]
+    pub fn of_runs(mut self) -> Self {
+        if self.objective.source() != Source::Simulated {
+            self.objective = Goal::SettlingCost;
+        }
+        self
     }
 
     /// The limits whose bounds are numbers, of figures that are found in that way.

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::gains::{Gain, Gains};
+use crate::goals::Goals;
 use crate::outcome::Outcome;
 use crate::search::{Evaluation, SearchSettings, Termination};
-use crate::goals::Goals;
 use crate::space::{Freedom, Space};
 
 /// The version of the record that this crate writes.

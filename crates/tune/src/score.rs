@@ -156,8 +156,8 @@ impl Scoring {
         // The last digits of sums on the way are not those of the sums at the end.
         let below = |figure: f64| figure * (1.0 - 1e-12);
         let mut limits = self.goals.limits_from(Source::Simulated);
-        let fails = metrics.diverged_at_s.is_some()
-            || limits.any(|(goal, bound)| below(self.figure(goal, metrics)) > bound);
+        let fails =
+            metrics.diverged_at_s.is_some() || limits.any(|(goal, bound)| below(self.figure(goal, metrics)) > bound);
         (!fails).then(|| below(self.figure(self.goals.objective, metrics)))
     }
 
@@ -346,7 +346,9 @@ mod tests {
         let mut run = first_order(1.0);
         run.segments[1].overshoot[0] = Some(0.03);
         let judged = with_limit(Goal::Overshoot, 0.02).of_run(&run);
-        assert!(matches!(judged, Outcome::Violates { excess, limit: Goal::Overshoot } if (excess.get() - 0.5).abs() < 1e-12));
+        assert!(
+            matches!(judged, Outcome::Violates { excess, limit: Goal::Overshoot } if (excess.get() - 0.5).abs() < 1e-12)
+        );
         assert!(with_limit(Goal::Overshoot, 0.03).of_run(&run).cost().is_some());
         assert_eq!(with_limit(Goal::Overshoot, 0.02).of_run_so_far(&run), None);
         assert!(with_limit(Goal::Overshoot, 0.03).of_run_so_far(&run).is_some());

@@ -8,8 +8,8 @@ use certune_control::aic::AicParams;
 use certune_dynamics::Robot;
 use certune_tune::filter::DEFAULT_SAMPLES;
 use certune_tune::{
-    AicObjective, Batch, BatchError, Bench, Finite, Gain, Gains, Goals, Judge, Method, Objective, Outcome,
-    Question, SearchSettings, Space, tune,
+    AicObjective, Batch, BatchError, Bench, Finite, Gain, Gains, Goals, Judge, Method, Objective, Outcome, Question,
+    SearchSettings, Space, tune,
 };
 
 const SCENARIO: &str = include_str!("../../../tuning/scenarios/pick-and-place.toml");

@@ -8,11 +8,11 @@ use certune::closed_loop::Scenario;
 use certune::dynamics::Robot;
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::{
-    AicObjective, Batch, BatchError, Bench, Evaluation, Gains, HeldOut, Objective, ObjectiveName, Outcome, Question,
-    SearchError, SearchSettings, Space, TuneError, Tuned, tune,
+    AicObjective, Batch, BatchError, Bench, Evaluation, Gains, Goal, Goals, HeldOut, Outcome, Question, RunRecord,
+    SearchError, SearchSettings, Source, Space, TuneError, Tuned, tune,
 };
 use certune::verify::{Certificate, Claim, ClaimKind, Record, Verdict};
-use certune::{ArmCertifier, CertifiedObjective, Growth, Over, StabilityError, family_of};
+use certune::{ArmCertifier, Growth, Over, StabilityError, family_of};
 use serde::Serialize;
 
 use super::claims::{ClaimSummary, claims_in_words, growths, summaries};
@@ -20,7 +20,7 @@ use crate::catalogue::{self, DEFAULT_PRESET, GainsSource};
 use crate::cli::{Context, ControllerName, Exit, TuneArgs};
 use crate::error::Error;
 use crate::output::{self, number, table};
-use crate::page::{self, Spread, spread};
+use crate::page::{self, Spread, percent_of_tail, spread};
 use crate::progress::{Terminal, achieved};
 use crate::run::{Folder, Run, RunFile};
 use crate::sizes::for_joint_count;
@@ -31,7 +31,7 @@ pub const DEFAULT_SEED: u64 = 1;
 /// Plants on which every candidate is simulated.
 const DEFAULT_PLANTS: usize = 8;
 /// Plants that judge start and winner.
-const HELD_OUT_PLANTS: usize = 32;
+const HELD_OUT_PLANTS: usize = 200;
 /// Candidates brought before the certifier at most.
 const ATTEMPTS: usize = 12;
 
@@ -79,7 +79,7 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
         .map_err(|source| Error::Threads { threads, source })?;
     let existed = plan.folder.path.exists();
     output::prepare_folder(&plan.folder.path)?;
-    let progress = Terminal::new(context.verbose).after(plan.question.objective);
+    let progress = Terminal::new(context.verbose).after(plan.question.goals.objective);
     let outcome = pool.install(|| {
         for_joint_count!(plan.robot.joints(), N => tune_arm::<N>(&plan, &progress))
             .unwrap_or_else(|| Err(catalogue::too_many_joints(&plan.robot)))
@@ -136,7 +136,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
             robot_sha256: robot.sha256(),
             scenario: scenario.name.clone(),
             versions: versions(),
-            objective: args.objective.unwrap_or_else(|| space.objective()),
+            goals: Goals { objective: args.objective.unwrap_or(space.goals().objective), ..space.goals().clone() },
             search: SearchSettings::new(space.method(), budget, seed),
             batch_plants: args.plants.unwrap_or(DEFAULT_PLANTS),
             held_out_plants: HELD_OUT_PLANTS,
@@ -192,16 +192,13 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
         progress.begin("sampling the arm's constants");
         certifier.constants();
     }
-    let simulated = AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES)
-        .map_err(misfit)?
-        .hardest_first(&plan.start);
-    let certified = CertifiedObjective::new(question.objective, &certifier, (robot, scenario), seed, DEFAULT_SAMPLES)
-        .map_err(misfit)?;
-    let objective: &dyn Objective = match &certified {
-        Some(certified) => certified,
-        None => &simulated,
-    };
-    let bench = Bench { objective, judge: &judge, progress };
+    let objective =
+        AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
+    let goals = objective.batch().resolved(question.goals.clone(), &plan.start);
+    let objective = objective.with_goals(&goals, &certifier).hardest_first(&plan.start);
+    let judge = judge.with_goals(&goals.clone().of_runs());
+    let question = Question { goals, ..question.clone() };
+    let bench = Bench { objective: &objective, judge: &judge, progress };
     let mut first_refusal: Option<Certificate> = None;
     let mut failure: Option<StabilityError> = None;
     let certify = |gains: &Gains| match certifier
@@ -220,7 +217,7 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
             Err(reason)
         }
     };
-    let Tuned { record, certificate } = tune(question.clone(), &plan.space, Some(&plan.start), bench, certify)?;
+    let Tuned { record, certificate } = tune(question, &plan.space, Some(&plan.start), bench, certify)?;
     if let Some(error) = failure {
         return Err(error.into());
     }
@@ -256,6 +253,38 @@ fn why_not(refusal: &Certificate) -> String {
     reasons.collect::<Vec<_>>().join("; ")
 }
 
+/// The limits that runs answer, and on how many held-out plants the tuned gains keep them.
+fn limits_kept(record: &RunRecord) -> Option<String> {
+    let limits: Vec<String> = record.question.goals.limits.iter().map(ToString::to_string).collect();
+    let plants = &record.held_out.tuned.as_ref()?.plants;
+    let kept = plants.iter().filter(|plant| plant.outcome.cost().is_some()).count();
+    (!limits.is_empty()).then(|| {
+        format!(
+            "Limits: {}. The tuned gains keep them on {kept} of {} held-out plants.",
+            limits.join(", "),
+            plants.len()
+        )
+    })
+}
+
+/// Why no candidate came before the certifier.
+fn nobody_came(record: &RunRecord) -> String {
+    let best = record.evaluations.iter().min_by_key(|evaluation| (evaluation.outcome, evaluation.index));
+    match best.map(|best| best.outcome) {
+        Some(Outcome::Violates { limit, .. }) => {
+            let limits: Vec<String> = record.question.goals.limits.iter().map(ToString::to_string).collect();
+            format!(
+                "no candidate keeps the limits ({}); the closest is furthest beyond that of {}",
+                limits.join(", "),
+                limit.name().replace('-', " ")
+            )
+        }
+        _ => {
+            "no candidate was stable and finished the task on every plant, so none came before the certifier".to_owned()
+        }
+    }
+}
+
 /// What a scenario does that no claim about its plant box covers.
 pub fn beyond_the_claims(scenario: &Scenario) -> Option<String> {
     let mut parts = Vec::new();
@@ -279,19 +308,22 @@ pub fn beyond_the_claims(scenario: &Scenario) -> Option<String> {
 fn in_words(plan: &Plan, run: &Run, growth: &[Option<Growth>], files: &[PathBuf], elapsed_s: f64) -> String {
     let record = &run.file.record;
     let question = &record.question;
+    let objective = question.goals.objective;
     let mut text = format!(
         "{} under the AIC in {}: {} candidates{}, {elapsed_s:.1} s\n\n",
         question.robot,
         question.scenario,
         record.evaluations.len(),
-        match question.objective {
-            ObjectiveName::SettlingCost => format!(" on {} plants", question.batch_plants),
-            objective => format!(" for the largest {}", objective.name().replace('-', " ")),
+        if question.goals.from(Source::Simulated).is_empty() {
+            format!(" for the largest {}", objective.name().replace('-', " "))
+        } else {
+            format!(" on {} plants", question.batch_plants)
         }
     );
-    if question.objective != ObjectiveName::SettlingCost {
+    if objective != Goal::SettlingCost {
         let reached = |evaluation: Option<&Evaluation>| match evaluation.map(|evaluation| evaluation.outcome) {
-            Some(Outcome::Certified { cost }) => achieved(cost.get(), question.objective),
+            Some(Outcome::Certified { cost } | Outcome::Simulated { cost }) => achieved(cost.get(), objective),
+            Some(Outcome::Violates { limit, .. }) => format!("beyond the limit of {}", limit.name().replace('-', " ")),
             _ => "not certified".to_owned(),
         };
         let _ =
@@ -303,9 +335,12 @@ fn in_words(plan: &Plan, run: &Run, growth: &[Option<Growth>], files: &[PathBuf]
         let cell = |spread: &Option<Spread>| number(spread.as_ref().and_then(value).map(|value| scale * value), digits);
         vec![name.to_owned(), cell(&published), cell(&tuned)]
     };
+    let unit = question.goals.clone().of_runs().objective.cost_unit();
     let rows = [
-        row("cost, worse half of the plants, s", 4, 1.0, |spread| spread.cost_s),
-        row("cost, worst plant, s", 4, 1.0, |spread| spread.worst_cost_s),
+        row(&format!("cost, worst {} % of the plants, {unit}", percent_of_tail(&question.goals)), 4, 1.0, |spread| {
+            spread.cost_s
+        }),
+        row(&format!("cost, worst plant, {unit}"), 4, 1.0, |spread| spread.worst_cost_s),
         row("slowest move settles in, s", 3, 1.0, |spread| spread.settling_time_s),
         row("largest final error, mrad", 3, 1e3, |spread| spread.final_error_rad),
         row("largest overshoot, %", 2, 1e2, |spread| spread.overshoot),
@@ -315,13 +350,15 @@ fn in_words(plan: &Plan, run: &Run, growth: &[Option<Growth>], files: &[PathBuf]
     let held_out = format!("{} held-out plants", question.held_out_plants);
     let header = [held_out.as_str(), &run.file.preset, "tuned"];
     text.push_str(&table(&header, &rows));
+    if let Some(kept) = limits_kept(record) {
+        text.push_str(&output::wrapped(&kept, 0));
+    }
     let _ = writeln!(text);
     match (record.winner(), &run.certificate) {
         (Some(_), Some(certificate)) => text.push_str(&claims_in_words(certificate, growth, false)),
         (_, refusal) => {
             let reason = match record.certification.len() {
-                0 => "no candidate was stable and finished the task on every plant, so none came before the certifier"
-                    .to_owned(),
+                0 => nobody_came(record),
                 1 => "the candidate brought before the certifier does not hold both claims".to_owned(),
                 count => format!("none of the {count} candidates brought before the certifier holds both claims"),
             };

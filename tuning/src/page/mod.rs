@@ -13,7 +13,7 @@ use certune::report::{
     Asked, CommandLine, CostMeaning, Evaluation, GainRow, Pair, RangeRow, SearchBounds, SearchRecord, SensitivityRow,
     TuningReport, Version, tuning_report,
 };
-use certune::tune::{Freedom, Gain, Gains, ObjectiveName, Outcome, Phase, RunRecord, Scale};
+use certune::tune::{Freedom, Gain, Gains, Goal, Goals, Outcome, Phase, RunRecord, Scale, Source};
 
 use crate::catalogue;
 use crate::error::Error;
@@ -77,28 +77,47 @@ fn asked(run: &Run, robot: &Robot, robot_argument: &str) -> Asked {
         scenario: question.scenario.clone(),
         scenario_in_words: run.file.scenario.description.clone(),
         plant_box: plant_box_rows(&run.file.scenario.plant_box),
-        cost: CostMeaning { unit: "s".to_owned(), in_words: cost_in_words(question.objective) },
+        cost: CostMeaning {
+            unit: question.goals.clone().of_runs().objective.cost_unit().to_owned(),
+            in_words: cost_in_words(&question.goals),
+        },
         seed: question.search.seed,
         budget: question.search.evaluations as u64,
         command: command(run, robot_argument),
     }
 }
 
-/// What the cost of the held-out plants means, after what the search was after if that is something else.
-fn cost_in_words(objective: ObjectiveName) -> String {
-    let sought = match objective {
-        ObjectiveName::SettlingCost => "",
-        ObjectiveName::CertifiedRate => {
-            "The search was after the largest certified decay rate. The held-out plants are compared by this cost. "
-        }
-        ObjectiveName::CertifiedRadius => {
-            "The search was after the largest certified radius. The held-out plants are compared by this cost. "
-        }
+/// What the cost of the held-out plants means, after what the search was after if that is something else, and before what had to be kept.
+fn cost_in_words(goals: &Goals) -> String {
+    let judged = goals.clone().of_runs();
+    let sought = if judged.objective == goals.objective {
+        String::new()
+    } else {
+        format!(
+            "The search was after the best {}. The held-out plants are compared by this cost. ",
+            words(goals.objective)
+        )
     };
-    format!(
-        "{sought}Per move: lag (the time constant of a first-order arm with the same time-weighted error) + torque-rate RMS over 1000 N m/s + \
-         overshoot + time at the torque limits; mean over the moves, then over the worse half of the plants."
-    )
+    let cost = match judged.objective {
+        Goal::SettlingCost => "Per move: lag (the time constant of a first-order arm with the same time-weighted error) + torque-rate RMS over \
+             1000 N m/s + overshoot + time at the torque limits; mean over the moves"
+            .to_owned(),
+        objective => format!("Per run: {}", words(objective)),
+    };
+    let limits: Vec<String> = goals.limits.iter().map(ToString::to_string).collect();
+    let kept =
+        if limits.is_empty() { String::new() } else { format!(" Limits on every plant: {}.", limits.join(", ")) };
+    format!("{sought}{cost}, then over the worst {} % of the plants.{kept}", percent_of_tail(goals))
+}
+
+/// A goal's name as a sentence has it.
+fn words(goal: Goal) -> String {
+    goal.name().replace('-', " ")
+}
+
+/// The share of the plants that make the cost, %.
+pub fn percent_of_tail(goals: &Goals) -> f64 {
+    (1e6 * (1.0 - goals.cvar)).round() / 1e4
 }
 
 /// The command that repeats the run; a scenario or space that is not built in is named by a file of its name.
@@ -115,8 +134,8 @@ fn command(run: &Run, robot_argument: &str) -> String {
     if !catalogue::SPACES.iter().any(|(name, _)| *name == run.file.space_name) {
         command.push_str(&format!(" --space {}", quoted(&format!("{}.toml", run.file.space_name))));
     }
-    if question.objective != ObjectiveName::SettlingCost {
-        command.push_str(&format!(" --objective {}", question.objective.name()));
+    if question.goals.objective != Goal::default() {
+        command.push_str(&format!(" --objective {}", question.goals.objective));
     }
     command.push_str(&format!(" --seed {} --budget {}", search.seed, search.evaluations));
     command
@@ -178,13 +197,13 @@ fn gain_rows(record: &RunRecord, gains: &Pair<Gains>) -> Vec<GainRow> {
 }
 
 fn search(record: &RunRecord) -> SearchRecord {
-    let objective = record.question.objective;
+    let objective = record.question.goals.objective;
     let mut best_so_far: Option<f64> = None;
     let evaluations = record.evaluations.iter().map(|evaluation| {
         // A candidate without a certificate has no figure to compare.
-        let cost = match (evaluation.outcome, objective) {
-            (Outcome::Uncertified { .. }, ObjectiveName::CertifiedRate | ObjectiveName::CertifiedRadius) => None,
-            (outcome, _) => outcome.cost(),
+        let cost = match evaluation.outcome {
+            Outcome::Uncertified { .. } if objective.source() == Source::Proved => None,
+            outcome => outcome.cost(),
         };
         best_so_far = match (best_so_far, cost) {
             (Some(best), Some(cost)) => Some(best.min(cost)),
@@ -202,6 +221,7 @@ fn search(record: &RunRecord) -> SearchRecord {
             Outcome::Certified { .. } => "certified",
             Outcome::Simulated { .. } => "simulated, certificate not asked for",
             Outcome::Stopped { .. } => "given up as no better",
+            Outcome::Violates { .. } => "beyond a limit",
             Outcome::Uncertified { .. } => "certificate refused",
             Outcome::Unstable { .. } => "unstable",
             Outcome::Diverged { .. } => "diverged",
@@ -216,11 +236,7 @@ fn search(record: &RunRecord) -> SearchRecord {
     });
     SearchRecord {
         evaluations: evaluations.collect(),
-        unit: match objective {
-            ObjectiveName::SettlingCost | ObjectiveName::CertifiedRate => "s",
-            ObjectiveName::CertifiedRadius => "1/rad",
-        }
-        .to_owned(),
+        unit: objective.cost_unit().to_owned(),
         published_cost: record.start().and_then(|start| start.outcome.cost()),
     }
 }
@@ -284,19 +300,20 @@ fn method(run: &Run, certified: bool) -> Vec<String> {
     let question = &record.question;
     let plants = runs::middle(&run.file.scenario.plant_box);
     let mut paragraphs = vec![
-        match question.objective {
-            ObjectiveName::SettlingCost => format!(
+        if question.goals.from(Source::Simulated).is_empty() {
+            format!(
+                "{} candidates were looked at. Each whose linearised loop decays at every configuration of a fixed sample was certified on the \
+                 box; its cost is the inverse of the certified figure. None was simulated in the search.",
+                record.evaluations.len()
+            )
+        } else {
+            format!(
                 "{} candidates were looked at. Each whose linearised loop decays at every configuration of a fixed sample ran the scenario \
                  on the same {} plants, drawn from the box with seed {}.",
                 record.evaluations.len(),
                 question.batch_plants,
                 question.search.seed
-            ),
-            ObjectiveName::CertifiedRate | ObjectiveName::CertifiedRadius => format!(
-                "{} candidates were looked at. Each whose linearised loop decays at every configuration of a fixed sample was certified on the \
-                 box; its cost is the inverse of the certified figure. None was simulated in the search.",
-                record.evaluations.len()
-            ),
+            )
         },
         format!(
             "Candidates went before the certifier from the lowest cost upwards ({} of them). The certificate is claimed on the whole box, \

@@ -7,7 +7,7 @@ use certune::control::aic::{Aic, AicParams, AicState};
 use certune::dynamics::{Joints, Robot};
 use certune::report::{Bands, HeldOut, Pair, PlantRow, Response, SegmentMetrics, SegmentRow, Trajectory as Curves};
 use certune::tune::streams::FIRST_HELD_OUT_PLANT;
-use certune::tune::{Batch, Gains, PlantResult, Verdict, score};
+use certune::tune::{Batch, Gains, PlantResult, Verdict};
 use rayon::prelude::*;
 
 use crate::error::Error;
@@ -48,7 +48,8 @@ pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Re
     let record = &run.file.record;
     let (scenario, question) = (&run.file.scenario, &record.question);
     let seed = question.search.seed;
-    let batch = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants)?;
+    let goals = question.goals.clone().of_runs();
+    let batch = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants)?.with_goals(&goals);
     let task = batch.task();
     let params = |gains: &Gains| {
         AicParams::<N>::new(&gains.on_every_joint(), task.step_s)
@@ -66,8 +67,8 @@ pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Re
     let (published, published_metrics) = curves(&nominal, task, &controllers.published, noise);
     let (tuned, tuned_metrics) = curves(&nominal, task, &controllers.tuned, noise);
 
-    let (published_bands, published_costs) = held_out(&batch, &controllers.published, &scenario.start_rad);
-    let (tuned_bands, tuned_costs) = held_out(&batch, &controllers.tuned, &scenario.start_rad);
+    let (published_bands, published_costs) = held_out(&batch, &controllers.published);
+    let (tuned_bands, tuned_costs) = held_out(&batch, &controllers.tuned);
     let published_costs = recorded(record.held_out.start.as_ref()).unwrap_or(published_costs);
     let tuned_costs = recorded(record.held_out.tuned.as_ref()).unwrap_or(tuned_costs);
     let plants = batch.plants().iter().zip(published_costs.into_iter().zip(tuned_costs));
@@ -151,13 +152,13 @@ fn figures(segment: &Segment) -> SegmentMetrics {
 }
 
 /// Bands of the position error over the plants, and each plant's cost.
-fn held_out<const N: usize>(batch: &Batch<N>, aic: &Aic<N>, start_rad: &[f64]) -> (Bands, Vec<Option<f64>>) {
+fn held_out<const N: usize>(batch: &Batch<N>, aic: &Aic<N>) -> (Bands, Vec<Option<f64>>) {
     let task = batch.task();
     let one = |(index, plant): &(u64, Plant<N>)| {
         let mut recorder = Trajectory::new(BAND_EVERY, |_: &Sample<'_, N, AicState<N>>| ());
         let metrics = simulate(plant, task, aic, batch.noise(*index), &mut recorder);
         let errors: Vec<f64> = recorder.rows().iter().map(|row| (row.q - row.goal).norm()).collect();
-        (errors, score::of_run(&metrics, start_rad, task.step_s).cost())
+        (errors, batch.scoring().of_run(&metrics).cost())
     };
     let (errors, costs): (Vec<Vec<f64>>, Vec<Option<f64>>) = batch.plants().par_iter().map(one).unzip();
     let samples = errors.iter().map(Vec::len).max().unwrap_or(0);
