@@ -22,7 +22,7 @@ use crate::gains::Gains;
 use crate::goals::{Excess, Goal, Goals, Source};
 use crate::outcome::{Finite, Outcome};
 use crate::record::{PlantResult, Verdict};
-use crate::score::{self, Scoring};
+use crate::score::Scoring;
 use crate::search::Objective;
 use crate::streams;
 use crate::tune::Judge;
@@ -144,7 +144,7 @@ impl<const N: usize> Batch<N> {
         let result = |(metrics, (index, _)): (Metrics, &(u64, Plant<N>))| PlantResult {
             plant: *index,
             outcome: self.scoring.of_run(&metrics),
-            figures: score::figures(&metrics),
+            figures: self.scoring.figures(&metrics),
         };
         found.into_iter().zip(&self.plants).map(result).collect()
     }

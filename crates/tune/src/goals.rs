@@ -165,11 +165,12 @@ impl Goal {
 
 impl core::fmt::Display for Limit {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let unit = if self.goal == Goal::Overshoot { "" } else { self.goal.unit() };
+        let name = self.goal.name().replace('-', " ");
         let side = if self.goal.is_at_least() { "at least" } else { "at most" };
         match self.bound {
-            Bound::At(bound) => write!(f, "{} {side} {} {unit}", self.goal.name().replace('-', " "), short(bound)),
-            Bound::Of(Reference::Start) => write!(f, "{} {side} the start's", self.goal.name().replace('-', " ")),
+            Bound::At(bound) if self.goal == Goal::Overshoot => write!(f, "{name} {side} {} %", short(100.0 * bound)),
+            Bound::At(bound) => write!(f, "{name} {side} {} {}", short(bound), self.goal.unit()),
+            Bound::Of(Reference::Start) => write!(f, "{name} {side} the start's"),
         }
     }
 }
@@ -295,13 +296,14 @@ impl Goals {
         Ok(())
     }
 
-    /// The goals by which plants alone can judge: the settling cost takes the place of an objective that no run answers.
+    /// What two sets of gains are compared by on plants: no limits, and the settling cost in place of an objective that no run answers.
     #[must_use]
-    pub fn of_runs(mut self) -> Self {
-        if self.objective.source() != Source::Simulated {
-            self.objective = Goal::SettlingCost;
-        }
-        self
+    pub fn for_comparison(&self) -> Self {
+        let objective = match self.objective.source() {
+            Source::Simulated => self.objective,
+            Source::Proved | Source::Linearised => Goal::SettlingCost,
+        };
+        Self { objective, cvar: self.cvar, limits: Vec::new() }
     }
 
     /// The limits whose bounds are numbers, of figures that are found in that way.
@@ -423,6 +425,15 @@ mod tests {
         assert_eq!(key(limit(Goal::Overshoot, Bound::At(0.0))), "limits.overshoot");
         assert_eq!(key(limit(Goal::DelayMargin, Bound::Of(Reference::Start))), "limits.delay_margin_s");
         assert!(limit(Goal::Jitter, Bound::Of(Reference::Start)).validate().is_ok());
+    }
+
+    #[test]
+    fn limits_read_as_a_sentence_has_them() {
+        let limit = |goal, bound| Limit { goal, bound }.to_string();
+        assert_eq!(limit(Goal::Overshoot, Bound::At(0.02)), "overshoot at most 2 %");
+        assert_eq!(limit(Goal::CertifiedRadius, Bound::At(0.8)), "certified radius at least 0.8 rad");
+        assert_eq!(limit(Goal::Jitter, Bound::At(18.514_63)), "jitter at most 18.51 N m/s");
+        assert_eq!(limit(Goal::Jitter, Bound::Of(Reference::Start)), "jitter at most the start's");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use crate::gains::{Gain, Gains};
-use crate::goals::Goals;
+use crate::goals::{Goal, Goals, Source};
 use crate::outcome::Outcome;
 use crate::search::{Evaluation, SearchSettings, Termination};
 use crate::space::{Freedom, Space};
@@ -75,6 +75,8 @@ pub struct PlantResult {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Figures {
+    /// The settling cost, s; `None` for a run that diverged.
+    pub settling_cost_s: Option<f64>,
     /// Longest time until a joint stays within 2 % of its step; `None` if one never does.
     pub settling_time_s: Option<f64>,
     /// Largest error at the end of a segment.
@@ -93,6 +95,23 @@ pub struct Figures {
     pub saturated_steps: u64,
 }
 
+impl Figures {
+    /// The figure of a goal; none when there is none, or no run alone answers it.
+    pub const fn get(&self, goal: Goal) -> Option<f64> {
+        match goal {
+            Goal::SettlingCost => self.settling_cost_s,
+            Goal::SettlingTime => self.settling_time_s,
+            Goal::FinalError => self.final_error_rad,
+            Goal::Itae => self.itae_rad_s2,
+            Goal::Overshoot => self.overshoot,
+            Goal::Jitter => self.torque_rate_rms_n_m_per_s,
+            Goal::PeakTorque => self.peak_torque_n_m,
+            Goal::Energy => self.energy_j,
+            Goal::CertifiedRate | Goal::CertifiedRadius | Goal::DelayMargin => None,
+        }
+    }
+}
+
 /// The judgement of plants that the search never saw, over the same plants for both.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -101,6 +120,17 @@ pub struct HeldOut {
     pub start: Option<Verdict>,
     /// The same for the winner; `None` without a winner.
     pub tuned: Option<Verdict>,
+}
+
+impl Verdict {
+    /// On how many plants every limit is kept that runs answer. A run without a figure, one that never settles say, keeps no limit on it.
+    pub fn keep_limits(&self, goals: &Goals) -> usize {
+        let keeps = |plant: &&PlantResult| {
+            let mut limits = goals.limits_from(Source::Simulated);
+            limits.all(|(goal, bound)| plant.figures.get(goal).is_some_and(|figure| figure <= bound))
+        };
+        self.plants.iter().filter(keeps).count()
+    }
 }
 
 /// One set of gains before the held-out plants.

@@ -142,6 +142,32 @@ impl Scoring {
         excess
     }
 
+    /// The figures of one run.
+    pub fn figures(&self, metrics: &Metrics) -> Figures {
+        let moving = |segment: &&Segment| segment.overshoot.iter().any(Option::is_some);
+        let settled: Option<Vec<f64>> =
+            metrics.segments.iter().filter(moving).map(Segment::slowest_settling_time_s).collect();
+        let worst = |value: fn(&Segment) -> f64| {
+            let values: Vec<f64> = metrics.segments.iter().map(value).collect();
+            (!values.is_empty()).then(|| largest(&values)).filter(|value| value.is_finite())
+        };
+        let sum = |value: fn(&Segment) -> f64| {
+            Some(metrics.segments.iter().map(value).sum::<f64>()).filter(|value| value.is_finite())
+        };
+        Figures {
+            settling_cost_s: Some(self.figure(Goal::SettlingCost, metrics))
+                .filter(|cost| cost.is_finite() && metrics.diverged_at_s.is_none()),
+            settling_time_s: settled.filter(|times| !times.is_empty()).map(|times| largest(&times)),
+            final_error_rad: worst(Segment::worst_final_error_rad),
+            overshoot: worst(Segment::worst_overshoot),
+            peak_torque_n_m: worst(|segment| largest(&segment.peak_torque_n_m)),
+            torque_rate_rms_n_m_per_s: worst(|segment| largest(&segment.torque_rate_rms_n_m_per_s)),
+            itae_rad_s2: sum(|segment| segment.itae_rad_s2.iter().sum()),
+            energy_j: sum(|segment| segment.energy_j.iter().sum()),
+            saturated_steps: metrics.saturated_steps(),
+        }
+    }
+
     /// The outcome of a whole run: its cost, 0 when the objective is not simulated; its excess; or its divergence.
     pub fn of_run(&self, metrics: &Metrics) -> Outcome {
         if let Some(at_s) = metrics.diverged_at_s {
@@ -203,30 +229,6 @@ fn tail_mean(worst_first: &[f64], cvar: f64) -> f64 {
     let weight = |place: usize| (tail - place as f64).clamp(0.0, 1.0);
     let sum: f64 = worst_first.iter().enumerate().map(|(place, cost)| weight(place) * cost).sum();
     sum / tail
-}
-
-/// The figures of one run.
-pub fn figures(metrics: &Metrics) -> Figures {
-    let moving = |segment: &&Segment| segment.overshoot.iter().any(Option::is_some);
-    let settled: Option<Vec<f64>> =
-        metrics.segments.iter().filter(moving).map(Segment::slowest_settling_time_s).collect();
-    let worst = |value: fn(&Segment) -> f64| {
-        let values: Vec<f64> = metrics.segments.iter().map(value).collect();
-        (!values.is_empty()).then(|| largest(&values)).filter(|value| value.is_finite())
-    };
-    let sum = |value: fn(&Segment) -> f64| {
-        Some(metrics.segments.iter().map(value).sum::<f64>()).filter(|value| value.is_finite())
-    };
-    Figures {
-        settling_time_s: settled.filter(|times| !times.is_empty()).map(|times| largest(&times)),
-        final_error_rad: worst(Segment::worst_final_error_rad),
-        overshoot: worst(Segment::worst_overshoot),
-        peak_torque_n_m: worst(|segment| largest(&segment.peak_torque_n_m)),
-        torque_rate_rms_n_m_per_s: worst(|segment| largest(&segment.torque_rate_rms_n_m_per_s)),
-        itae_rad_s2: sum(|segment| segment.itae_rad_s2.iter().sum()),
-        energy_j: sum(|segment| segment.energy_j.iter().sum()),
-        saturated_steps: metrics.saturated_steps(),
-    }
 }
 
 fn largest(values: &[f64]) -> f64 {
@@ -305,7 +307,7 @@ mod tests {
         let hold = Scoring { start_rad: vec![1.0], goal_steps: vec![60_000], ..scoring(Goals::default()) };
         let cost = hold.of_run(&still).cost().unwrap();
         assert!((cost - (1.0_f64 / LEAST_STEP_RAD).sqrt()).abs() < 1e-12);
-        assert_eq!(figures(&still).settling_time_s, None);
+        assert_eq!(hold.figures(&still).settling_time_s, None);
         assert!(hold.figure(Goal::SettlingTime, &still).abs() < 1e-12);
     }
 
@@ -359,11 +361,11 @@ mod tests {
         let mut run = first_order(1.0);
         run.segments[1].final_error_rad[0] = -0.02;
         run.segments[0].settling_time_s[0] = Some(9.0);
-        let worst = figures(&run);
+        let worst = scoring(Goals::default()).figures(&run);
         assert_eq!((worst.final_error_rad, worst.settling_time_s), (Some(0.02), Some(9.0)));
         assert_eq!((worst.itae_rad_s2, worst.energy_j), (Some(1.5), Some(3.0)));
         run.segments[1].settling_time_s[0] = None;
-        assert_eq!(figures(&run).settling_time_s, None);
+        assert_eq!(scoring(Goals::default()).figures(&run).settling_time_s, None);
     }
 
     fn simulated(cost_s: f64) -> Outcome {

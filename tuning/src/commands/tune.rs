@@ -196,7 +196,7 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
         AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
     let goals = objective.batch().resolved(question.goals.clone(), &plan.start);
     let objective = objective.with_goals(&goals, &certifier).hardest_first(&plan.start);
-    let judge = judge.with_goals(&goals.clone().of_runs());
+    let judge = judge.with_goals(&goals.for_comparison());
     let question = Question { goals, ..question.clone() };
     let bench = Bench { objective: &objective, judge: &judge, progress };
     let mut first_refusal: Option<Certificate> = None;
@@ -256,13 +256,13 @@ fn why_not(refusal: &Certificate) -> String {
 /// The limits that runs answer, and on how many held-out plants the tuned gains keep them.
 fn limits_kept(record: &RunRecord) -> Option<String> {
     let limits: Vec<String> = record.question.goals.limits.iter().map(ToString::to_string).collect();
-    let plants = &record.held_out.tuned.as_ref()?.plants;
-    let kept = plants.iter().filter(|plant| plant.outcome.cost().is_some()).count();
+    let tuned = record.held_out.tuned.as_ref()?;
     (!limits.is_empty()).then(|| {
         format!(
-            "Limits: {}. The tuned gains keep them on {kept} of {} held-out plants.",
+            "Limits: {}; the tuned gains keep them on {} of {} held-out plants.",
             limits.join(", "),
-            plants.len()
+            tuned.keep_limits(&record.question.goals),
+            tuned.plants.len()
         )
     })
 }
@@ -335,7 +335,7 @@ fn in_words(plan: &Plan, run: &Run, growth: &[Option<Growth>], files: &[PathBuf]
         let cell = |spread: &Option<Spread>| number(spread.as_ref().and_then(value).map(|value| scale * value), digits);
         vec![name.to_owned(), cell(&published), cell(&tuned)]
     };
-    let unit = question.goals.clone().of_runs().objective.cost_unit();
+    let unit = question.goals.for_comparison().objective.cost_unit();
     let rows = [
         row(&format!("cost, worst {} % of the plants, {unit}", percent_of_tail(&question.goals)), 4, 1.0, |spread| {
             spread.cost_s

@@ -78,7 +78,7 @@ fn asked(run: &Run, robot: &Robot, robot_argument: &str) -> Asked {
         scenario_in_words: run.file.scenario.description.clone(),
         plant_box: plant_box_rows(&run.file.scenario.plant_box),
         cost: CostMeaning {
-            unit: question.goals.clone().of_runs().objective.cost_unit().to_owned(),
+            unit: question.goals.for_comparison().objective.cost_unit().to_owned(),
             in_words: cost_in_words(&question.goals),
         },
         seed: question.search.seed,
@@ -89,7 +89,7 @@ fn asked(run: &Run, robot: &Robot, robot_argument: &str) -> Asked {
 
 /// What the cost of the held-out plants means, after what the search was after if that is something else, and before what had to be kept.
 fn cost_in_words(goals: &Goals) -> String {
-    let judged = goals.clone().of_runs();
+    let judged = goals.for_comparison();
     let sought = if judged.objective == goals.objective {
         String::new()
     } else {

@@ -48,7 +48,7 @@ pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Re
     let record = &run.file.record;
     let (scenario, question) = (&run.file.scenario, &record.question);
     let seed = question.search.seed;
-    let goals = question.goals.clone().of_runs();
+    let goals = question.goals.for_comparison();
     let batch = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants)?.with_goals(&goals);
     let task = batch.task();
     let params = |gains: &Gains| {
