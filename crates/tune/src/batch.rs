@@ -10,15 +10,16 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use certune_closed_loop::{
-    KeyError, Metrics, NoiseStream, Plant, PlantError, Run, Scenario, Task, simulate_many, simulate_many_while,
+    Gains, KeyError, Metrics, NoiseStream, Parameters, Plant, PlantError, Run, Scenario, Task, simulate_many,
+    simulate_many_while,
 };
 use certune_control::aic::AicParams;
+use certune_control::mrac::MracParams;
 use certune_dynamics::Robot;
 use certune_simd::InstructionSet;
 use rayon::prelude::*;
 
 use crate::filter::StabilityFilter;
-use crate::gains::Gains;
 use crate::outcome::{Finite, Outcome};
 use crate::record::{PlantResult, Verdict};
 use crate::score;
@@ -100,18 +101,14 @@ impl<const N: usize> Batch<N> {
     }
 
     /// Plants with the noise and the gains that they run with.
-    fn runs<'a>(
-        &'a self,
-        plants: &'a [(u64, Plant<N>)],
-        params: &'a AicParams<N>,
-    ) -> Vec<(Run<'a, N>, &'a AicParams<N>)> {
+    fn runs<'a, P: Parameters<N>>(&'a self, plants: &'a [(u64, Plant<N>)], params: &'a P) -> Vec<(Run<'a, N>, &'a P)> {
         let run =
             |(index, plant): &'a (u64, Plant<N>)| (Run { plant, task: &self.task, noise: self.noise(*index) }, params);
         plants.iter().map(run).collect()
     }
 
     /// One run on each plant. Costs one simulation of the scenario per plant.
-    pub fn run(&self, params: &AicParams<N>) -> Vec<PlantResult> {
+    pub fn run<P: Parameters<N>>(&self, params: &P) -> Vec<PlantResult> {
         // As many plants at a time as run side by side.
         self.plants
             .par_chunks(InstructionSet::widest().lanes())
@@ -130,7 +127,7 @@ impl<const N: usize> Batch<N> {
     /// runs cost at least, and all stop when the plants together cost too much, or one has diverged.
     ///
     /// Which thread sees it first depends on the hour; the answer does not, as whatever is worse than `enough` is answered alike.
-    pub fn outcome(&self, params: &AicParams<N>, enough: Option<Finite>) -> Outcome {
+    pub fn outcome<P: Parameters<N>>(&self, params: &P, enough: Option<Finite>) -> Outcome {
         let Some(enough) = enough else {
             return score::of_batch(self.run(params).iter().map(|plant| plant.outcome));
         };
@@ -173,19 +170,36 @@ impl<const N: usize> Batch<N> {
         outcome
     }
 
-    /// Puts the plants on which `params` fare worst first; what they say together stays the same.
+    /// Puts the plants on which `gains` fare worst first; what they say together stays the same.
     #[must_use]
-    pub fn hardest_first(mut self, params: &AicParams<N>) -> Self {
-        let mut found: Vec<(Outcome, (u64, Plant<N>))> =
-            self.run(params).iter().map(|plant| plant.outcome).zip(core::mem::take(&mut self.plants)).collect();
-        found.sort_by(|(a, _), (b, _)| b.cmp(a));
-        self.plants = found.into_iter().map(|(_, plant)| plant).collect();
+    pub fn hardest_first(mut self, gains: &Gains) -> Self {
+        let found = self.judge(gains).plants;
+        if found.is_empty() {
+            return self;
+        }
+        let outcomes = found.iter().map(|plant| plant.outcome);
+        let mut plants: Vec<_> = outcomes.zip(core::mem::take(&mut self.plants)).collect();
+        plants.sort_by(|(a, _), (b, _)| b.cmp(a));
+        self.plants = plants.into_iter().map(|(_, plant)| plant).collect();
         self
     }
 
-    fn params(&self, gains: &Gains) -> Option<AicParams<N>> {
-        AicParams::new(&gains.on_every_joint(), self.task.step_s).ok()
+    /// The controller of these gains, if they make one on this arm.
+    fn checked(&self, gains: &Gains) -> Option<Checked<N>> {
+        let step_s = self.task.step_s;
+        match gains {
+            Gains::Aic(table) => AicParams::new(&table.bind().ok()?, step_s).ok().map(Checked::Aic),
+            Gains::Mrac(table) => {
+                MracParams::new(&table.bind().ok()?, step_s).ok().map(|params| Checked::Mrac(Box::new(params)))
+            }
+        }
     }
+}
+
+/// Checked parameters of either controller.
+enum Checked<const N: usize> {
+    Aic(AicParams<N>),
+    Mrac(Box<MracParams<N>>),
 }
 
 /// Gains that make no controller fail before the first sample.
@@ -195,22 +209,23 @@ fn no_controller() -> Outcome {
 
 impl<const N: usize> Judge for Batch<N> {
     fn judge(&self, gains: &Gains) -> Verdict {
-        let Some(params) = self.params(gains) else {
-            return Verdict { outcome: no_controller(), plants: Vec::new() };
+        let plants = match self.checked(gains) {
+            None => return Verdict { outcome: no_controller(), plants: Vec::new() },
+            Some(Checked::Aic(params)) => self.run(&params),
+            Some(Checked::Mrac(params)) => self.run(&*params),
         };
-        let plants = self.run(&params);
         Verdict { outcome: score::of_batch(plants.iter().map(|plant| plant.outcome)), plants }
     }
 }
 
-/// The objective of a search for gains of the active inference controller: the stability filter, then the batch.
+/// The objective of a search for gains of either controller: the stability filter, then the batch.
 #[derive(Clone, Debug)]
-pub struct AicObjective<const N: usize> {
+pub struct SimulatedObjective<const N: usize> {
     batch: Batch<N>,
     filter: StabilityFilter<N>,
 }
 
-impl<const N: usize> AicObjective<N> {
+impl<const N: usize> SimulatedObjective<N> {
     /// The first `plants` plants of `seed`, behind a filter of `filter_samples` samples.
     ///
     /// # Errors
@@ -230,9 +245,7 @@ impl<const N: usize> AicObjective<N> {
     /// The plants on which `gains` fare worst come first, so that a candidate that is not good enough is known soon. Outcomes do not change.
     #[must_use]
     pub fn hardest_first(mut self, gains: &Gains) -> Self {
-        if let Some(params) = self.batch.params(gains) {
-            self.batch = self.batch.hardest_first(&params);
-        }
+        self.batch = self.batch.hardest_first(gains);
         self
     }
 
@@ -247,13 +260,22 @@ impl<const N: usize> AicObjective<N> {
     }
 }
 
-impl<const N: usize> Objective for AicObjective<N> {
-    fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
-        let Some(params) = self.batch.params(gains) else { return no_controller() };
-        let growth_per_s = self.filter.growth_per_s(&params);
+impl<const N: usize> SimulatedObjective<N> {
+    fn filtered<P: Parameters<N>>(&self, params: &P, enough: Option<Finite>) -> Outcome {
+        let growth_per_s = self.filter.growth_per_s(params);
         if growth_per_s.get() >= 0.0 {
             return Outcome::Unstable { abscissa_per_s: growth_per_s };
         }
-        self.batch.outcome(&params, enough)
+        self.batch.outcome(params, enough)
+    }
+}
+
+impl<const N: usize> Objective for SimulatedObjective<N> {
+    fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
+        match self.batch.checked(gains) {
+            None => no_controller(),
+            Some(Checked::Aic(params)) => self.filtered(&params, enough),
+            Some(Checked::Mrac(params)) => self.filtered(&*params, enough),
+        }
     }
 }

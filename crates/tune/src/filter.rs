@@ -11,10 +11,10 @@
 //! configurations within the joint limits, each with a plant. Every third plant is the lightest of the box, every third the heaviest, both with the least
 //! friction (light arms lose stability to sampling and delay, heavy arms to slow integration), the others are drawn.
 //!
-//! Limits: a sample proves nothing between its points. Cost: two eigenvalue problems of order 6N each.
+//! Limits: a sample proves nothing between its points, and the adaptive controller's gains are taken as frozen with nothing accumulated. Cost: two eigenvalue problems of order 6N
+//! each, 3N for the adaptive controller.
 
-use certune_closed_loop::{PlantBox, PlantError, PlantSetting, Scenario, Task, linearise_aic, linearise_aic_sampled};
-use certune_control::aic::AicParams;
+use certune_closed_loop::{Parameters, PlantBox, PlantError, PlantSetting, Scenario, Task};
 use certune_dynamics::{Model, Robot};
 use certune_linsys::Joints;
 use rand_chacha::ChaCha8Rng;
@@ -88,12 +88,13 @@ impl<const N: usize> StabilityFilter<N> {
     }
 
     /// The largest growth rate over the sample, 1/s: negative when every loop decays. A loop that overflows grows as fast as a number can.
-    pub fn growth_per_s(&self, params: &AicParams<N>) -> Finite {
+    pub fn growth_per_s<P: Parameters<N>>(&self, params: &P) -> Finite {
         let compensated = self.gravity_compensation;
         let growth = |FilterSample { model, q }: &FilterSample<N>| {
-            let continuous = linearise_aic(model, q, params, compensated)
-                .map_or(f64::INFINITY, |found| found.spectral_abscissa_per_s());
-            let sampled = linearise_aic_sampled(model, q, params, compensated, self.delay_samples)
+            let continuous =
+                params.linearised(model, q, compensated).map_or(f64::INFINITY, |found| found.spectral_abscissa_per_s());
+            let sampled = params
+                .linearised_sampled(model, q, compensated, self.delay_samples)
                 .map_or(f64::INFINITY, |found| -found.decay_per_s());
             Finite::saturating(continuous).max(Finite::saturating(sampled))
         };

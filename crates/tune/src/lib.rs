@@ -7,7 +7,6 @@
 
 pub mod batch;
 pub mod filter;
-mod gains;
 pub mod outcome;
 pub mod record;
 pub mod score;
@@ -16,13 +15,13 @@ pub mod space;
 pub mod streams;
 pub mod tune;
 
-pub use batch::{AicObjective, Batch, BatchError};
+pub use batch::{Batch, BatchError, SimulatedObjective};
+pub use certune_closed_loop::Gains;
 pub use filter::StabilityFilter;
-pub use gains::{Gain, Gains, NotShared};
 pub use outcome::{Finite, NotFinite, Outcome};
-pub use record::{Attempt, Figures, HeldOut, PlantResult, Question, RunRecord, Sensitivity, Verdict};
+pub use record::{Attempt, Figures, HeldOut, PlantResult, Question, RunRecord, Sensitivity, SpaceRecord, Verdict};
 pub use search::{
     Candidate, Evaluation, Objective, Phase, Progress, SearchError, SearchRun, SearchSettings, Termination, search,
 };
-pub use space::{Freedom, Method, ObjectiveName, Range, Scale, Space, SpaceError};
+pub use space::{Knob, Method, ObjectiveName, Range, Scale, Setting, Space, SpaceError, SpaceFile, Tie};
 pub use tune::{Bench, Judge, Stage, TuneError, TuneProgress, Tuned, tune};

@@ -1,18 +1,18 @@
-//! A certified figure as the objective of a search.
+//! A certified figure of the active inference controller as the objective of a search.
 //!
 //! A candidate goes through the stability filter first (linearised loops, continuous and sampled, on a fixed sample), so that a search for the best
 //! continuous-time figure does not end at gains that no sampled controller can have. What passes is certified; the cost is the inverse of the
 //! certified figure. The figure is the checked one: slack that a solver leaves in its answer is worth nothing here.
 
-use certune_closed_loop::Scenario;
+use certune_closed_loop::{Gains, Scenario};
 use certune_control::aic::AicParams;
 use certune_dynamics::Robot;
-use certune_tune::{BatchError, Finite, Gains, Objective, ObjectiveName, Outcome, StabilityFilter};
+use certune_tune::{BatchError, Finite, Objective, ObjectiveName, Outcome, StabilityFilter};
 use certune_verify::{Certificate, ClaimKind, Verdict};
 
 use super::arm::ArmCertifier;
 
-/// The largest certified rate or radius, as an objective.
+/// The largest certified rate or radius, as an objective. The adaptive controller has neither: its gains count as no controller.
 #[derive(Debug)]
 pub struct CertifiedObjective<'a, const N: usize> {
     certifier: &'a ArmCertifier<N>,
@@ -57,8 +57,12 @@ impl<'a, const N: usize> CertifiedObjective<'a, N> {
 impl<const N: usize> Objective for CertifiedObjective<'_, N> {
     // A certificate is all or nothing: it cannot be given up half way.
     fn evaluate(&self, gains: &Gains, _: Option<Finite>) -> Outcome {
-        let gains = gains.on_every_joint();
-        let Ok(params) = AicParams::new(&gains, self.step_s) else {
+        let bound = match gains {
+            Gains::Aic(table) => table.bind().ok(),
+            Gains::Mrac(_) => None,
+        };
+        let Some((gains, params)) = bound.and_then(|gains| Some((gains, AicParams::new(&gains, self.step_s).ok()?)))
+        else {
             return Outcome::Diverged { at_s: Finite::saturating(0.0) };
         };
         let growth_per_s = self.filter.growth_per_s(&params);

@@ -285,8 +285,9 @@ impl<const N: usize, T: Lanes> Mrac<N, T> {
     pub fn pack<'a>(of: impl Fn(usize) -> &'a MracParams<N>) -> Self {
         let first = Mrac::<N>::new(of(0));
         let lanes = |get: &dyn Fn(&Mrac<N>) -> f64| T::from_lanes(|lane| get(&Mrac::new(of(lane))));
-        let joints =
-            |get: &dyn Fn(&Mrac<N>) -> Joints<N>| Joints::from_fn(|joint, _| lanes(&|controller| get(controller)[joint]));
+        let joints = |get: &dyn Fn(&Mrac<N>) -> Joints<N>| {
+            Joints::from_fn(|joint, _| lanes(&|controller| get(controller)[joint]))
+        };
         let rows = |get: fn(&Mrac<N>) -> &[Joints<N>; 3]| core::array::from_fn(|row| joints(&|c| get(c)[row]));
         Self {
             law: first.law,
