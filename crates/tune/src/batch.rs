@@ -13,12 +13,11 @@ use certune_closed_loop::{
     Gains, KeyError, Metrics, NoiseStream, Parameters, Plant, PlantError, Run, Scenario, Task, simulate_many,
     simulate_many_while,
 };
-use certune_control::aic::AicParams;
-use certune_control::mrac::MracParams;
 use certune_dynamics::Robot;
 use certune_simd::InstructionSet;
 use rayon::prelude::*;
 
+use crate::checked::Checked;
 use crate::filter::StabilityFilter;
 use crate::outcome::{Finite, Outcome};
 use crate::record::{PlantResult, Verdict};
@@ -183,23 +182,6 @@ impl<const N: usize> Batch<N> {
         self.plants = plants.into_iter().map(|(_, plant)| plant).collect();
         self
     }
-
-    /// The controller of these gains, if they make one on this arm.
-    fn checked(&self, gains: &Gains) -> Option<Checked<N>> {
-        let step_s = self.task.step_s;
-        match gains {
-            Gains::Aic(table) => AicParams::new(&table.bind().ok()?, step_s).ok().map(Checked::Aic),
-            Gains::Mrac(table) => {
-                MracParams::new(&table.bind().ok()?, step_s).ok().map(|params| Checked::Mrac(Box::new(params)))
-            }
-        }
-    }
-}
-
-/// Checked parameters of either controller.
-enum Checked<const N: usize> {
-    Aic(AicParams<N>),
-    Mrac(Box<MracParams<N>>),
 }
 
 /// Gains that make no controller fail before the first sample.
@@ -209,7 +191,7 @@ fn no_controller() -> Outcome {
 
 impl<const N: usize> Judge for Batch<N> {
     fn judge(&self, gains: &Gains) -> Verdict {
-        let plants = match self.checked(gains) {
+        let plants = match Checked::new(gains, self.task.step_s) {
             None => return Verdict { outcome: no_controller(), plants: Vec::new() },
             Some(Checked::Aic(params)) => self.run(&params),
             Some(Checked::Mrac(params)) => self.run(&*params),
@@ -272,7 +254,7 @@ impl<const N: usize> SimulatedObjective<N> {
 
 impl<const N: usize> Objective for SimulatedObjective<N> {
     fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
-        match self.batch.checked(gains) {
+        match Checked::new(gains, self.batch.task.step_s) {
             None => no_controller(),
             Some(Checked::Aic(params)) => self.filtered(&params, enough),
             Some(Checked::Mrac(params)) => self.filtered(&*params, enough),

@@ -14,13 +14,14 @@
 //! Limits: a sample proves nothing between its points, and the adaptive controller's gains are taken as frozen with nothing accumulated. Cost: two eigenvalue problems of order 6N
 //! each, 3N for the adaptive controller.
 
-use certune_closed_loop::{Parameters, PlantBox, PlantError, PlantSetting, Scenario, Task};
+use certune_closed_loop::{Gains, Parameters, PlantBox, PlantError, PlantSetting, Scenario, Task};
 use certune_dynamics::{Model, Robot};
 use certune_linsys::Joints;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use rayon::prelude::*;
 
+use crate::checked::Checked;
 use crate::outcome::Finite;
 use crate::streams;
 
@@ -85,6 +86,14 @@ impl<const N: usize> StabilityFilter<N> {
     /// Whether the sample is empty; then nothing is ever rejected.
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
+    }
+
+    /// [`StabilityFilter::growth_per_s`] of a candidate; none when its gains make no controller.
+    pub fn growth_of(&self, gains: &Gains, step_s: f64) -> Option<Finite> {
+        Checked::new(gains, step_s).map(|checked| match checked {
+            Checked::Aic(params) => self.growth_per_s(&params),
+            Checked::Mrac(params) => self.growth_per_s(&*params),
+        })
     }
 
     /// The largest growth rate over the sample, 1/s: negative when every loop decays. A loop that overflows grows as fast as a number can.

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod batch;
+mod checked;
 pub mod filter;
 pub mod outcome;
 pub mod record;
