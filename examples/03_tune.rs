@@ -6,11 +6,13 @@ use std::collections::BTreeMap;
 use std::error::Error;
 use std::path::Path;
 
-use certune::closed_loop::{Gains as GainsTable, GainsFile, Scenario};
+use certune::closed_loop::{Gains, GainsFile, Scenario};
 use certune::dynamics::Robot;
-use certune::tune::{AicObjective, Batch, Bench, Gains, ObjectiveName, Outcome, Question, SearchSettings, Space, tune};
+use certune::tune::{
+    Batch, Bench, Goals, Outcome, Question, SearchSettings, Setting, SimulatedObjective, SpaceFile, tune,
+};
 use certune::verify::ClaimKind;
-use certune::{ArmCertifier, family_of};
+use certune::{ArmCertifier, ArmGains, Request, family_of};
 
 /// Runs the story.
 ///
@@ -21,11 +23,10 @@ pub fn main() -> Result<(), Box<dyn Error>> {
     let file = Path::new("tuning/scenarios/pick-and-place.toml");
     let scenario = Scenario::parse(file, include_str!("../tuning/scenarios/pick-and-place.toml"))?;
     let file = Path::new("tuning/spaces/panda-aic.toml");
-    let space = Space::parse(file, include_str!("../tuning/spaces/panda-aic.toml"))?;
+    let space = SpaceFile::parse(file, include_str!("../tuning/spaces/panda-aic.toml"))?;
     let file = Path::new("tuning/presets/pezzato2020-simulation.toml");
-    let preset = GainsFile::parse(file, include_str!("../tuning/presets/pezzato2020-simulation.toml"))?;
-    let GainsTable::Aic(table) = &preset.gains else { return Err("the preset is of another controller".into()) };
-    let published = Gains::from_table(table)?;
+    let published = GainsFile::parse(file, include_str!("../tuning/presets/pezzato2020-simulation.toml"))?.gains;
+    let space = space.on(Setting { start: Some(&published), ..Setting::default() })?;
 
     // Twenty candidates, two plants of the box; a real run has 150 and 8.
     let (seed, evaluations) = (1, 20);
@@ -34,25 +35,24 @@ pub fn main() -> Result<(), Box<dyn Error>> {
         robot_sha256: robot.sha256(),
         scenario: scenario.name.clone(),
         versions: BTreeMap::from([("certune".to_owned(), env!("CARGO_PKG_VERSION").to_owned())]),
-        objective: ObjectiveName::SettlingCost,
+        goals: Goals::default(),
         search: SearchSettings::new(space.method(), evaluations, seed),
         batch_plants: 2,
         held_out_plants: 4,
         certification_attempts: 4,
     };
     // The search meets the first plants of the seed behind a filter of 16 linearised loops; the judge has plants that no candidate has met.
-    let objective = AicObjective::<7>::new(&robot, &scenario, seed, question.batch_plants, 16)?;
+    let objective = SimulatedObjective::<7>::new(&robot, &scenario, seed, question.batch_plants, 16)?;
     let judge = Batch::<7>::held_out(&robot, &scenario, seed, question.held_out_plants)?;
     let bench = Bench { objective: &objective, judge: &judge, progress: &() };
 
     // What "certified" means is decided here: every claim, for the whole plant box.
     let certifier = ArmCertifier::<7>::new(&robot, &family_of(&scenario.plant_box)?)?;
-    let certify = |gains: &Gains| match certifier
-        .certify(&gains.on_every_joint(), &[ClaimKind::Exponential, ClaimKind::Region])
-    {
-        Ok(certificate) if certificate.all_hold() => Ok(certificate),
-        Ok(_) => Err("a claim does not hold".to_owned()),
-        Err(error) => Err(error.to_string()),
+    let asked = Request { claims: vec![ClaimKind::Exponential, ClaimKind::Region], ..Request::default() };
+    let certify = |gains: &Gains| {
+        let gains = ArmGains::bind(gains).map_err(|error| error.to_string())?;
+        let certificate = certifier.answer(&gains, &asked).map_err(|error| error.to_string())?.certificate;
+        if certificate.all_hold() { Ok(certificate) } else { Err("a claim does not hold".to_owned()) }
     };
     let tuned = tune(question, &space, Some(&published), bench, certify)?;
 

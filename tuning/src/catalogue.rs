@@ -5,13 +5,14 @@
 use std::path::{Path, PathBuf};
 
 use certune::closed_loop::file::{load, nearest};
-use certune::closed_loop::{AicTable, Gains, GainsFile, KeyError, PlantBox, Scenario};
+use certune::closed_loop::{AicTable, GainsFile, KeyError, PlantBox, Scenario};
 use certune::control::aic::{AicGains, AicParams};
 use certune::control::mrac::MracParams;
 use certune::dynamics::{BUILT_IN, MOST_JOINTS, Robot, RobotError};
-use certune::tune::Space;
+use certune::tune::SpaceFile;
 use certune::verify::Record;
 
+use crate::cli::ControllerName;
 use crate::error::{Error, Kind};
 use crate::output;
 
@@ -34,8 +35,11 @@ pub const SCENARIOS: [(&str, &str); 6] = [
     ("push", include_str!("../scenarios/push.toml")),
 ];
 
-/// Search spaces.
-pub const SPACES: [(&str, &str); 1] = [("panda-aic", include_str!("../spaces/panda-aic.toml"))];
+/// Search spaces; the first of a controller is its default.
+pub const SPACES: [(&str, &str); 2] = [
+    ("panda-aic", include_str!("../spaces/panda-aic.toml")),
+    ("panda-mrac", include_str!("../spaces/panda-mrac.toml")),
+];
 
 /// Proved constants, each record of one robot over one set of configurations.
 pub const CONSTANTS: [(&str, &str); 4] = [
@@ -46,7 +50,13 @@ pub const CONSTANTS: [(&str, &str); 4] = [
 ];
 
 /// The preset that a run is compared with when its search space names none.
-pub const DEFAULT_PRESET: &str = "pezzato2020-simulation";
+pub const fn default_preset(controller: ControllerName) -> &'static str {
+    match controller {
+        ControllerName::Aic => "pezzato2020-simulation",
+        ControllerName::Mrac => "pezzato2020-mrac-simulation",
+    }
+}
+
 /// The scenario of the built-in robots.
 const DEFAULT_SCENARIO: &str = "pick-and-place";
 
@@ -131,14 +141,6 @@ impl GainsSource {
         let Text { name, file, text } = find(Kind::Preset, given, &PRESETS)?;
         let gains = GainsFile::parse(&file, &text)?;
         Ok(Self { name, file, text, gains })
-    }
-
-    /// The table of an AIC; `command` is what was to be done with it.
-    pub fn aic(&self, command: &'static str) -> Result<&AicTable, Error> {
-        match &self.gains.gains {
-            Gains::Aic(table) => Ok(table),
-            Gains::Mrac(_) => Err(Error::Mrac { command }),
-        }
     }
 
     /// The AIC's gains for `N` joints, checked.
@@ -234,11 +236,22 @@ fn record(path: &Path, text: &str) -> Result<Record, Error> {
         .map_err(|source| Error::RecordRejected { path: path.to_path_buf(), source })
 }
 
-/// The search space of that file with a name for the record, or the built-in one.
-pub fn space(given: Option<&str>) -> Result<(String, Space), Error> {
-    let Text { file, text, .. } = find(Kind::Space, given.unwrap_or(SPACES[0].0), &SPACES)?;
-    let name = Path::new(given.unwrap_or(SPACES[0].0)).file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    Ok((name.unwrap_or_default(), Space::parse(&file, &text)?))
+/// The search space of that file with a name for the record, or the built-in one of the controller.
+pub fn space(given: Option<&str>, controller: Option<ControllerName>) -> Result<(String, SpaceFile), Error> {
+    let built_in = match controller {
+        None | Some(ControllerName::Aic) => SPACES[0].0,
+        Some(ControllerName::Mrac) => SPACES[1].0,
+    };
+    let given = given.unwrap_or(built_in);
+    let Text { file, text, .. } = find(Kind::Space, given, &SPACES)?;
+    let name = Path::new(given).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let space = SpaceFile::parse(&file, &text)?;
+    match controller {
+        Some(wanted) if wanted.name() != space.controller() => {
+            Err(Error::OtherController { space: given.to_owned(), found: space.controller(), wanted: wanted.name() })
+        }
+        _ => Ok((name.unwrap_or_default(), space)),
+    }
 }
 
 #[cfg(test)]
@@ -285,8 +298,11 @@ mod tests {
                 record.arm.name
             );
         }
-        let (name, space) = space(None).unwrap();
-        assert!(name == "panda-aic" && space.start() == Some(DEFAULT_PRESET));
+        for controller in [ControllerName::Aic, ControllerName::Mrac] {
+            let (name, space) = space(None, Some(controller)).unwrap();
+            assert_eq!((name, space.controller()), (format!("panda-{}", controller.name()), controller.name()));
+            assert_eq!(space.start(), Some(default_preset(controller)));
+        }
         assert!(BUILT_IN.iter().all(|name| !robot_in_words(name).is_empty()));
     }
 }

@@ -93,8 +93,18 @@ pub struct RobotArgs {
 pub enum ControllerName {
     /// Active inference
     Aic,
-    /// Model reference adaptive control: can be simulated, not tuned yet
+    /// Model reference adaptive control
     Mrac,
+}
+
+impl ControllerName {
+    /// The name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Aic => "aic",
+            Self::Mrac => "mrac",
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -106,10 +116,10 @@ pub struct TuneArgs {
     /// Last link of the arm, for a URDF file that branches
     #[arg(long, value_name = "LINK")]
     pub tip: Option<String>,
-    /// Controller to tune [default: aic]
+    /// Controller to tune [default: that of the search space, or aic]
     #[arg(long, value_name = "NAME")]
     pub controller: Option<ControllerName>,
-    /// Search space: a TOML file [default: the built-in panda-aic]
+    /// Search space: a TOML file, or the built-in panda-aic or panda-mrac [default: that of the controller]
     #[arg(long, value_name = "FILE")]
     pub space: Option<String>,
     /// Scenario by name or TOML file [default: pick-and-place; for a URDF file a generic one]
@@ -138,7 +148,7 @@ pub struct TuneArgs {
 
 #[derive(Debug, Args)]
 pub struct AskTellArgs {
-    /// Search space: a TOML file [default: the built-in panda-aic]
+    /// Search space: a TOML file, or the built-in panda-aic or panda-mrac [default: panda-aic]
     #[arg(long, value_name = "FILE")]
     pub space: Option<String>,
     /// Candidates to evaluate [default: 300]

@@ -8,7 +8,7 @@ use certune::closed_loop::{FileError, KeyError, PlantError};
 use certune::control::ParamError;
 use certune::dynamics::RobotError;
 use certune::report::ReportError;
-use certune::tune::{BatchError, NotShared, SearchError, SpaceError, TuneError};
+use certune::tune::{BatchError, Goal, SearchError, SpaceError, TuneError};
 use certune::verify::VerifyError;
 
 /// What a name on the command line is the name of.
@@ -58,12 +58,12 @@ pub enum Error {
     /// Gains that make no controller.
     #[error("gains `{gains}`: {source}")]
     Gains { gains: String, source: ParamError },
-    /// Gains that a search cannot start from.
-    #[error("gains `{gains}`: {source}")]
-    NotShared { gains: String, source: NotShared },
-    /// A controller that the command does not cover.
-    #[error("`{command}` does not cover model reference adaptive control (mrac) yet")]
-    Mrac { command: &'static str },
+    /// A search space of another controller than the one to be tuned.
+    #[error("--controller {wanted}, but search space `{space}` holds gains for `{found}`")]
+    OtherController { space: String, found: &'static str, wanted: &'static str },
+    /// A figure that the controller's claims do not have.
+    #[error("{goal} is no goal of a search for gains of `mrac`: no claim about it has this figure")]
+    NoFigure { goal: Goal },
     /// A list on the command line that does not fit the robot.
     #[error("{flag} has {found} numbers, but robot `{robot}` has {joints} joints")]
     ListLength { flag: &'static str, found: usize, robot: String, joints: usize },
@@ -142,12 +142,8 @@ impl Error {
                 "--scenario with a file written for this robot; without --scenario, a URDF robot gets a generic one"
                     .to_owned(),
             ),
-            Self::NotShared { .. } => {
-                Some("a preset with the same gains on every joint, see `autotune presets`".to_owned())
-            }
-            Self::Mrac { .. } => {
-                Some("`autotune simulate` runs mrac gains; use aic gains here, see `autotune presets`".to_owned())
-            }
+            Self::OtherController { found, .. } => Some(format!("--controller {found}, or another --space")),
+            Self::NoFigure { .. } => Some("another --objective or limit, or --controller aic".to_owned()),
             Self::ListLength { joints, .. } => Some(format!("{joints} numbers separated by commas, base to tip")),
             Self::Stability(StabilityError::NoTorqueLimit { .. }) => {
                 Some("--torque-limits with a number, or an `effort` for every joint in the URDF file".to_owned())

@@ -6,6 +6,7 @@
 //! | `commands` | one file a command |
 //! | `values` | values of options: what they may be, and what is said when they are not |
 //! | `catalogue` | robots, presets, scenarios, search spaces and proved constants, by name or by path |
+//! | `promise` | what a tuned set of gains must have certified |
 //! | `sizes` | an arm's number of joints as a type |
 //! | `run` | a run's folder: `gains.toml`, `run.json`, `certificate.json`, `report.html` |
 //! | `page` | a run's record into the data of its page |
@@ -24,6 +25,7 @@ mod error;
 mod output;
 mod page;
 mod progress;
+mod promise;
 mod run;
 mod sizes;
 mod values;

@@ -1,18 +1,20 @@
-//! A run's folder: `gains.toml`, `run.json`, `certificate.json`, `report.html`.
+//! A run's folder: `gains.toml`, `run.json`, `certificate.json`, `report.html`. Where the claims are about one goal each, there is a certificate for
+//! every goal: `certificate-1.json`, `certificate-2.json`, ..
 //!
 //! `run.json` and `gains.toml` are the same to the byte for the same question and versions: they hold no time, no path and nothing of
 //! the machine. All files are written beside their places first and moved there together.
 
 use std::path::{Path, PathBuf};
 
-use certune::closed_loop::{AicTable, Gains, GainsFile, Scenario};
-use certune::tune::{Gains as SharedGains, RunRecord};
+use certune::closed_loop::{GainsFile, Scenario};
+use certune::tune::RunRecord;
 use certune::verify::{Certificate, verify};
 use serde::Serialize;
 use serde_json::Value;
 
 use crate::error::Error;
 use crate::output::{self, Staged};
+use crate::promise;
 use crate::versions::VERSION;
 
 /// The content of `run.json`: the record of the search, and what else a page needs.
@@ -35,11 +37,11 @@ pub struct RunFile {
 #[derive(Debug)]
 pub struct Run {
     pub file: RunFile,
-    /// For a run without winner, the refusal of its best candidate.
-    pub certificate: Option<Certificate>,
+    /// For a run without winner, those of its best candidate up to the refusal.
+    pub certificates: Vec<Certificate>,
 }
 
-/// The four names.
+/// The names.
 #[derive(Clone, Debug)]
 pub struct Folder {
     pub path: PathBuf,
@@ -52,54 +54,76 @@ impl Folder {
     pub fn record(&self) -> PathBuf {
         self.path.join("run.json")
     }
-    pub fn certificate(&self) -> PathBuf {
-        self.path.join("certificate.json")
+    /// The certificate's file, or those of `count` certificates.
+    pub fn certificates(&self, count: usize) -> Vec<PathBuf> {
+        match count {
+            0 | 1 => vec![self.path.join("certificate.json")],
+            _ => (1..=count).map(|number| self.path.join(format!("certificate-{number}.json"))).collect(),
+        }
     }
     pub fn report(&self) -> PathBuf {
         self.path.join("report.html")
     }
 
-    /// Reads `run.json` and `certificate.json`, which is checked, not believed.
+    /// Reads `run.json` and the certificates, which are checked, not believed.
     pub fn read(&self) -> Result<Run, Error> {
         let path = self.record();
         let text = std::fs::read_to_string(&path).map_err(|source| Error::NoRun { path: path.clone(), source })?;
         let file = RunFile::parse(&path, &text)?;
-        let path = self.certificate();
-        let certificate = match output::read_file(&path) {
-            Err(Error::Io { source, .. })
-                if source.kind() == std::io::ErrorKind::NotFound && file.record.winner.is_none() =>
-            {
-                None
+        let mut certificates = Vec::new();
+        for path in self.certificates(file.certificates()) {
+            match output::read_file(&path) {
+                // Those of a refused candidate end with the refusal.
+                Err(Error::Io { source, .. })
+                    if source.kind() == std::io::ErrorKind::NotFound && file.record.winner.is_none() =>
+                {
+                    break;
+                }
+                text => certificates.push(
+                    verify(&text?, &crate::catalogue::records(&[])?)
+                        .map_err(|source| Error::Certificate { path: path.clone(), source })?
+                        .map_err(|source| Error::Rejected { path, source })?,
+                ),
             }
-            text => Some(
-                verify(&text?, &crate::catalogue::records(&[])?)
-                    .map_err(|source| Error::Certificate { path: path.clone(), source })?
-                    .map_err(|source| Error::Rejected { path, source })?,
-            ),
-        };
-        Ok(Run { file, certificate })
+        }
+        Ok(Run { file, certificates })
+    }
+
+    /// The certificates' files of an earlier run in the folder.
+    fn earlier_certificates(&self) -> Result<Vec<PathBuf>, Error> {
+        let broken = |source| Error::Io { action: "read", path: self.path.clone(), source };
+        let mut found = Vec::new();
+        for entry in std::fs::read_dir(&self.path).map_err(broken)? {
+            let name = entry.map_err(broken)?.file_name();
+            let number = name.to_str().and_then(|name| name.strip_prefix("certificate")?.strip_suffix(".json"));
+            let is_ours = |number: &str| {
+                number.is_empty() || number.strip_prefix('-').is_some_and(|digits| digits.parse::<usize>().is_ok())
+            };
+            if number.is_some_and(is_ours) {
+                found.push(self.path.join(name));
+            }
+        }
+        Ok(found)
     }
 
     /// Writes all files of a run; those that this run has not, of an earlier run in the same folder, are removed.
     pub fn write(&self, run: &Run, page: &str) -> Result<Vec<PathBuf>, Error> {
         let record = serde_json::to_string_pretty(&run.file)? + "\n";
         let gains = run.file.gains_toml();
-        let certificate = run.certificate.as_ref().map(certune::certificate_text).transpose()?;
-        let files = [
-            (self.gains(), gains),
-            (self.record(), Some(record)),
-            (self.certificate(), certificate),
-            (self.report(), Some(page.to_owned())),
-        ];
+        let texts: Vec<String> = run.certificates.iter().map(certune::certificate_text).collect::<Result<_, _>>()?;
+        let mut files = vec![(self.gains(), gains), (self.record(), Some(record))];
+        files.extend(self.certificates(run.file.certificates()).into_iter().zip(texts.into_iter().map(Some)));
+        files.push((self.report(), Some(page.to_owned())));
         let mut staged = Vec::new();
         for (path, content) in &files {
             if let Some(content) = content {
                 staged.push(Staged::write(path, content)?);
             }
         }
-        for (path, content) in &files {
-            if content.is_none() {
-                output::remove_file(path)?;
+        let is_new = |path: &PathBuf| files.iter().any(|(new, content)| new == path && content.is_some());
+        for path in self.earlier_certificates()?.into_iter().chain([self.gains()]) {
+            if !is_new(&path) {
+                output::remove_file(&path)?;
             }
         }
         staged.into_iter().try_for_each(Staged::commit)?;
@@ -135,25 +159,26 @@ impl RunFile {
         }
     }
 
+    /// How many certificates the run's winner has.
+    pub fn certificates(&self) -> usize {
+        self.record.evaluations.first().map_or(1, |first| promise::certificates(&first.gains, &self.scenario))
+    }
+
     /// The gains file of the winner.
     pub fn gains_toml(&self) -> Option<String> {
         let question = &self.record.question;
         let source = format!(
             "autotune {VERSION}: tuned for robot {} in scenario {}, seed {}, {} candidates from {} in space {}; certified, see \
-             certificate.json",
+             {}",
             question.robot,
             question.scenario,
             question.search.seed,
             self.record.evaluations.len(),
             self.preset,
             self.space_name,
+            if self.certificates() > 1 { "the certificates" } else { "certificate.json" },
         );
-        let gains = Gains::Aic(table(self.record.tuned()?));
+        let gains = self.record.tuned()?.clone();
         Some(GainsFile { source: Some(source), gains }.to_toml())
     }
-}
-
-/// Gains that all joints share, as a file holds them.
-fn table(gains: &SharedGains) -> AicTable {
-    AicTable::from(&gains.on_every_joint::<1>())
 }

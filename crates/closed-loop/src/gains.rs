@@ -34,9 +34,9 @@ pub use per_joint::{PerJoint, decimal};
 /// The schema version of gains files.
 pub const GAINS_SCHEMA: i64 = 1;
 
-/// The table of a gains file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "lowercase", tag = "controller", content = "gains")]
+/// The table of a gains file. In records it is the table alone: no two controllers have the same rows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
 pub enum Gains {
     /// The active inference controller.
     Aic(AicTable),
@@ -44,13 +44,60 @@ pub enum Gains {
     Mrac(Box<MracTable>),
 }
 
+impl Gains {
+    /// The controller's name in files.
+    pub const fn controller(&self) -> &'static str {
+        match self {
+            Self::Aic(_) => "aic",
+            Self::Mrac(_) => "mrac",
+        }
+    }
+
+    /// The rows in the order of the file, each with its key.
+    pub fn rows(&self) -> Vec<(&'static str, &PerJoint)> {
+        match self {
+            Self::Aic(table) => table.rows().to_vec(),
+            Self::Mrac(table) => table.rows().to_vec(),
+        }
+    }
+
+    /// The row of that key, if the controller has it.
+    pub fn row(&self, key: &str) -> Option<&PerJoint> {
+        self.rows().into_iter().find(|(name, _)| *name == key).map(|(_, numbers)| numbers)
+    }
+
+    /// The same gains with other numbers in the row of that key; a key of another controller changes nothing.
+    #[must_use]
+    pub fn with(mut self, key: &str, numbers: PerJoint) -> Self {
+        let row = match &mut self {
+            Self::Aic(table) => table.row_mut(key),
+            Self::Mrac(table) => table.row_mut(key),
+        };
+        if let Some(row) = row {
+            *row = numbers;
+        }
+        self
+    }
+}
+
+impl From<AicTable> for Gains {
+    fn from(table: AicTable) -> Self {
+        Self::Aic(table)
+    }
+}
+
+impl From<MracTable> for Gains {
+    fn from(table: MracTable) -> Self {
+        Self::Mrac(Box::new(table))
+    }
+}
+
 /// A gains file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GainsFile {
     /// Where the numbers come from.
     pub source: Option<String>,
     /// The numbers.
-    #[serde(flatten)]
     pub gains: Gains,
 }
 
@@ -108,10 +155,7 @@ impl GainsFile {
 
     /// The file's text. Read again it gives the same numbers to the bit.
     pub fn to_toml(&self) -> String {
-        let (controller, rows): (&str, &[(&str, &PerJoint)]) = match &self.gains {
-            Gains::Aic(table) => ("aic", &table.rows()),
-            Gains::Mrac(table) => ("mrac", &table.rows()),
-        };
+        let controller = self.gains.controller();
         let mut text = format!("schema = {GAINS_SCHEMA}\ncontroller = \"{controller}\"\n");
         if let Some(source) = &self.source {
             text.push_str(&format!("source = {}\n", toml::Value::from(source.as_str())));
@@ -120,7 +164,7 @@ impl GainsFile {
         if let Gains::Mrac(table) = &self.gains {
             text.push_str(&format!("law = \"{}\"\n", MracLaw::from(table.law).name()));
         }
-        for (key, numbers) in rows {
+        for (key, numbers) in self.gains.rows() {
             // `{:?}` is the shortest text that reads back as the same number, and always a TOML float.
             let value = match numbers {
                 PerJoint::Shared(value) => format!("{value:?}"),

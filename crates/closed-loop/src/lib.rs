@@ -11,7 +11,8 @@
 //! | [`metrics`] | figures per goal and joint |
 //! | [`drift`] | how far the adaptive gains drift from goal to goal |
 //! | [`trajectory`] | a run kept for plots |
-//! | [`linear`] | plant and active inference controller linearised, continuous and sampled |
+//! | [`parameters`] | what simulation and linearisation need of a controller |
+//! | [`linear`] | plant and controller linearised, continuous and sampled |
 //! | [`knowledge`] | the arm's model handed to a baseline controller |
 //!
 //! Controllers come from `certune-control` and never see the plant; arms come from `certune-dynamics` and know no controller. They
@@ -48,6 +49,7 @@ pub mod gains;
 pub mod knowledge;
 pub mod linear;
 pub mod metrics;
+pub mod parameters;
 pub mod plant_box;
 pub mod scenario;
 pub mod simulate;
@@ -58,8 +60,9 @@ pub use drift::{GainDrift, gain_drift};
 pub use file::{FileError, KeyError, Location, Problem};
 pub use gains::{AicTable, Gains, GainsFile, LawName, MracTable, PerJoint};
 pub use knowledge::KnownModel;
-pub use linear::{linearise_aic, linearise_aic_sampled};
+pub use linear::{linearise_aic, linearise_aic_sampled, linearise_mrac, linearise_mrac_sampled};
 pub use metrics::{Metrics, Segment};
+pub use parameters::Parameters;
 pub use plant_box::{PlantBox, PlantError, PlantSetting};
 pub use scenario::Scenario;
 pub use simulate::{

@@ -34,7 +34,6 @@
 //!
 //! Nothing in the loop over samples allocates.
 
-use certune_control::aic::{Aic, AicParams};
 use certune_control::{Controller, Measurement};
 use certune_dynamics::{COULOMB_SPEED_RAD_PER_S, Model, Posture, Robot, State, flange_jacobian};
 use certune_linsys::{Joints, Lanes, Real};
@@ -44,6 +43,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 
 use crate::metrics::{Contribution, Meter, Metrics};
+use crate::parameters::Parameters;
 use crate::plant_box::{PlantError, PlantSetting};
 use crate::scenario::{Integrator, Method};
 use crate::task::{Interval, Load, Task};
@@ -581,23 +581,26 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
     }
 }
 
-/// Runs tasks under the active inference controller, as many side by side as this machine's registers hold, and returns their figures in the same order.
+/// Runs tasks under a controller, as many side by side as this machine's registers hold, and returns their figures in the same order.
 ///
-/// Each run has its own gains. Runs of tasks that do not step alike ([`Task::steps_alike`]) do not share a bundle. On one instruction set the figures of a
+/// Each run has its own gains. Runs of tasks that do not step alike ([`Task::steps_alike`]), or of parameters that cannot share lanes, do not share a bundle. On one instruction set the figures of a
 /// run are the same to the bit whatever it is run beside; they are those of [`simulate`] up to rounding. Runs on the current thread.
-pub fn simulate_many<const N: usize>(runs: &[(Run<'_, N>, &AicParams<N>)]) -> Vec<Metrics> {
+pub fn simulate_many<const N: usize, P: Parameters<N>>(runs: &[(Run<'_, N>, &P)]) -> Vec<Metrics> {
     simulate_many_on(InstructionSet::widest(), runs)
 }
 
 /// [`simulate_many`] on an instruction set of one's choice.
-pub fn simulate_many_on<const N: usize>(set: InstructionSet, runs: &[(Run<'_, N>, &AicParams<N>)]) -> Vec<Metrics> {
+pub fn simulate_many_on<const N: usize, P: Parameters<N>>(
+    set: InstructionSet,
+    runs: &[(Run<'_, N>, &P)],
+) -> Vec<Metrics> {
     bundles(set, runs).flat_map(|runs| set.run(WholeTasks { runs, watch: None })).collect()
 }
 
 /// [`simulate_many`], looked at on the way: `go_on` is given the first of the runs of a bundle by its place in `runs`, and the figures so far of them all, every
 /// `every` samples, and ends the bundle by `false`. The figures of an ended run are those up to there.
-pub fn simulate_many_while<const N: usize>(
-    runs: &[(Run<'_, N>, &AicParams<N>)],
+pub fn simulate_many_while<const N: usize, P: Parameters<N>>(
+    runs: &[(Run<'_, N>, &P)],
     every: u64,
     go_on: &mut dyn FnMut(usize, &[Metrics]) -> bool,
 ) -> Vec<Metrics> {
@@ -612,11 +615,12 @@ pub fn simulate_many_while<const N: usize>(
 }
 
 /// Neighbours that can share a bundle.
-fn bundles<'a, 'b, const N: usize>(
+fn bundles<'a, 'b, const N: usize, P: Parameters<N>>(
     set: InstructionSet,
-    runs: &'a [(Run<'b, N>, &'b AicParams<N>)],
-) -> impl Iterator<Item = &'a [(Run<'b, N>, &'b AicParams<N>)]> {
-    runs.chunk_by(|(a, _), (b, _)| a.task.steps_alike(b.task)).flat_map(move |runs| runs.chunks(set.lanes()))
+    runs: &'a [(Run<'b, N>, &'b P)],
+) -> impl Iterator<Item = &'a [(Run<'b, N>, &'b P)]> {
+    runs.chunk_by(|(a, of_a), (b, of_b)| a.task.steps_alike(b.task) && of_a.share_lanes(of_b))
+        .flat_map(move |runs| runs.chunks(set.lanes()))
 }
 
 /// Who looks at a bundle, and after how many samples each time.
@@ -626,18 +630,18 @@ struct Watch<'a> {
 }
 
 /// A bundle from its start to its end.
-struct WholeTasks<'a, 'b, 'w, const N: usize> {
-    runs: &'a [(Run<'b, N>, &'b AicParams<N>)],
+struct WholeTasks<'a, 'b, 'w, const N: usize, P> {
+    runs: &'a [(Run<'b, N>, &'b P)],
     watch: Option<Watch<'w>>,
 }
 
-impl<const N: usize> Kernel for WholeTasks<'_, '_, '_, N> {
+impl<const N: usize, P: Parameters<N>> Kernel for WholeTasks<'_, '_, '_, N, P> {
     type Output = Vec<Metrics>;
     #[inline(always)]
     fn run<T: Lanes>(self) -> Vec<Metrics> {
         let Some((_, first)) = self.runs.first() else { return Vec::new() };
         let runs: Vec<Run<'_, N>> = self.runs.iter().map(|(run, _)| *run).collect();
-        let controller = Aic::<N, T>::pack(|lane| self.runs.get(lane).map_or(*first, |(_, params)| *params));
+        let controller = P::pack::<T>(|lane| self.runs.get(lane).map_or(*first, |(_, params)| *params));
         let mut bundle = Bundle::side_by_side(&runs, &controller);
         let mut watch = self.watch;
         let mut look_at = watch.as_ref().map_or(u64::MAX, |watch| watch.every);

@@ -8,6 +8,7 @@ use certune_closed_loop::{
     Metrics, NoiseStream, Plant, PlantSetting, Run, Scenario, Task, simulate, simulate_many, simulate_many_on,
 };
 use certune_control::aic::{Aic, AicGains, AicParams};
+use certune_control::mrac::{Mrac, MracGains, MracLaw, MracParams};
 use certune_dynamics::Robot;
 use certune_simd::InstructionSet;
 use certune_testkit::PUBLISHED;
@@ -153,5 +154,49 @@ proptest! {
         for (found, index) in simulate_many(&some).iter().zip(&order) {
             prop_assert_eq!(found, &together[*index]);
         }
+    }
+}
+
+/// Gains of an adaptive controller that differ from run to run, in inertia and damping those of the Panda.
+fn adaptive(index: usize, law: MracLaw) -> MracParams<7> {
+    let each = |value: f64| [value; 7];
+    let gains = MracGains {
+        law,
+        omega_rad_per_s: each(3.0 + 0.1 * index as f64),
+        zeta: each(1.0),
+        l1: each(1.0),
+        l2: each(0.2),
+        alpha: [[900.0, 900.0, 600.0, 400.0, 20.0, 20.0, 20.0], each(30.0), each(0.0)],
+        e0: [each(1.0), each(0.5), each(0.0)],
+        e1: [each(5.0), each(0.5), each(if index % 3 == 2 { 1e-4 } else { 0.0 })],
+        f0: [each(1.0), each(0.5), each(0.0)],
+        f1: [each(1.0), each(0.5), each(0.0)],
+    };
+    MracParams::new(&gains, 1e-3).unwrap()
+}
+
+#[test]
+fn adaptive_controllers_run_in_lanes_as_alone_whatever_their_laws() {
+    let mixed = Mixed::new(9, 3);
+    let laws = [MracLaw::ReferenceModel, MracLaw::ReferenceModel, MracLaw::RawGoal];
+    let params: Vec<MracParams<7>> = (0..9).map(|index| adaptive(index, laws[index / 3])).collect();
+    let runs: Vec<_> = mixed.runs().into_iter().zip(&params).map(|((run, _), params)| (run, params)).collect();
+    let alone = |index: usize| {
+        let (run, params) = runs[index];
+        simulate(run.plant, run.task, &Mrac::new(params), run.noise, &mut ())
+    };
+    // Adaptive gains keep what rounding has put into them: the loop forgets less than that of the AIC.
+    const RELATIVE: f64 = 1e-9;
+    for (index, lanes) in simulate_many(&runs).iter().enumerate() {
+        assert!(lanes.diverged_at_s.is_none(), "run {index} tests nothing");
+        assert_near(lanes, &alone(index), RELATIVE);
+    }
+    for (index, plain) in simulate_many_on(InstructionSet::Plain, &runs).into_iter().enumerate() {
+        assert_eq!(plain, alone(index));
+    }
+    let backwards: Vec<_> = runs.iter().rev().copied().collect();
+    let together = simulate_many(&runs);
+    for (found, expected) in simulate_many(&backwards).iter().zip(together.iter().rev()) {
+        assert_eq!(found, expected);
     }
 }

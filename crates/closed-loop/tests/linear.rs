@@ -4,9 +4,11 @@ use std::path::Path;
 
 use certune_closed_loop::{
     Gains, GainsFile, NoiseStream, Plant, PlantSetting, Scenario, Simulation, linearise_aic, linearise_aic_sampled,
+    linearise_mrac, linearise_mrac_sampled,
 };
-use certune_control::Measurement;
 use certune_control::aic::{Aic, AicGains, AicParams, AicState};
+use certune_control::mrac::{Mrac, MracGains, MracLaw, MracParams, MracState};
+use certune_control::{Controller, Measurement};
 use certune_dynamics::{Robot, State, forward_dynamics, gravity_torque};
 use certune_linsys::Joints;
 use nalgebra::{DMatrix, DVector};
@@ -216,4 +218,69 @@ fn published_stability_facts_are_reproduced() {
     let share = unstable(200.0);
     // 18 to 24 % are stated.
     assert!((90..=120).contains(&share), "{share} of 500 configurations");
+}
+
+/// Published gains under the paper's equations, with derivative terms none and numbers that differ from joint to joint.
+fn adaptive_params() -> MracParams<7> {
+    let text = include_str!("../../../tuning/presets/pezzato2020-mrac-robot.toml");
+    let file = GainsFile::parse(Path::new("preset"), text).expect("a preset");
+    let Gains::Mrac(table) = file.gains else { unreachable!("an MRAC preset") };
+    let gains: MracGains<7> = table.bind().expect("seven joints");
+    let omega_rad_per_s = [2.0, 2.5, 3.0, 3.5, 2.2, 2.4, 2.6];
+    MracParams::new(&MracGains { law: MracLaw::ReferenceModel, omega_rad_per_s, ..gains }, STEP_S).expect("valid gains")
+}
+
+/// The controller at rest at the goal with `w` accumulated, as its integrals hold it: each of the error times what it multiplies there.
+fn accumulated(params: &MracParams<7>, controller: &Mrac<7>, w: &Joints<7>) -> MracState<7> {
+    let at = Measurement { q: pose(), dq: Joints::zeros() };
+    let mut state = controller.start(&at);
+    let of_error = Joints::from_fn(|joint, _| -params.error_weights()[joint].p3 * w[joint]);
+    state.integral.q_e = of_error;
+    state.integral.q = of_error * pose().transpose();
+    state.integral.q_ref = state.integral.q;
+    state
+}
+
+/// What the integrals hold, as `w`.
+fn read(params: &MracParams<7>, state: &MracState<7>) -> Joints<7> {
+    Joints::from_fn(|joint, _| -state.integral.q_e[joint] / params.error_weights()[joint].p3)
+}
+
+#[test]
+fn the_adaptive_loops_are_the_derivatives_of_one_step_and_of_each_other() {
+    let robot = Robot::panda();
+    let params = adaptive_params();
+    let controller = Mrac::<7>::new(&params);
+    for compensated in [false, true] {
+        let model = setting(&robot, compensated, 0.0).model::<7>(&robot).unwrap();
+        // Without compensation the arm is held by a constant torque: what the integrals would hold is not about this point.
+        let gravity = |q: &Joints<7>| gravity_torque(&model, &if compensated { *q } else { pose() });
+        for delay in [0, 1, 2] {
+            let step = |x: &DVector<f64>| {
+                let (q, dq) = (pose() + block(x, 0), block(x, 1));
+                let state = accumulated(&params, &controller, &block(x, 2));
+                let (next, u) = controller.step(&state, &Measurement { q, dq }, &pose());
+                let acting = if delay == 0 { u } else { block(x, 2 + delay) };
+                let ddq = forward_dynamics(&model, &State { q, dq }, &(acting + gravity(&q)));
+                let dq = dq + ddq * STEP_S;
+                let mut blocks = vec![q + dq * STEP_S - pose(), dq, read(&params, &next)];
+                blocks.extend((0..delay).map(|age| if age == 0 { u } else { block(x, 2 + age) }));
+                DVector::from_iterator(7 * blocks.len(), blocks.iter().flat_map(|block| block.iter().copied()))
+            };
+            let exact = linearise_mrac_sampled(&model, &pose(), &params, compensated, delay).unwrap();
+            let numeric = differences(7 * (3 + delay), step);
+            let error = (exact.matrix() - &numeric).amax() / numeric.amax();
+            assert!(error < DIFFERENCE_RTOL, "compensated {compensated}, delay {delay}: relative error {error:e}");
+        }
+        // A step is the identity and h times the field, up to h²: positions move with the new velocity.
+        let field = linearise_mrac(&model, &pose(), &params, compensated).unwrap();
+        let sampled = linearise_mrac_sampled(&model, &pose(), &params, compensated, 0).unwrap();
+        let mut euler = DMatrix::identity(21, 21) + field.matrix() * STEP_S;
+        let moved = euler.rows(7, 7) * STEP_S;
+        euler.rows_mut(0, 7).copy_from(&moved);
+        for joint in 0..7 {
+            euler[(joint, joint)] += 1.0;
+        }
+        assert!((sampled.matrix() - euler).amax() < 1e-12);
+    }
 }

@@ -10,15 +10,15 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use certune_closed_loop::{
-    KeyError, Metrics, NoiseStream, Plant, PlantError, Run, Scenario, Task, simulate_many, simulate_many_while,
+    Gains, KeyError, Metrics, NoiseStream, Parameters, Plant, PlantError, Run, Scenario, Task, simulate_many,
+    simulate_many_while,
 };
-use certune_control::aic::AicParams;
 use certune_dynamics::Robot;
 use certune_simd::InstructionSet;
 use rayon::prelude::*;
 
+use crate::checked::Checked;
 use crate::filter::StabilityFilter;
-use crate::gains::Gains;
 use crate::goals::{Excess, Goal, Goals, Source};
 use crate::outcome::{Finite, Outcome};
 use crate::record::{PlantResult, Verdict};
@@ -77,8 +77,14 @@ impl<const N: usize> Batch<N> {
 
     /// `goals` with numbers for what limits say of the gains that the search starts from: what those reach on the worst of these plants.
     pub fn resolved(&self, goals: Goals, start: &Gains) -> Goals {
-        let Some(params) = self.params(start).filter(|_| goals.look_at_start()) else { return goals };
-        let found = self.metrics(&params);
+        if !goals.look_at_start() {
+            return goals;
+        }
+        let found = match Checked::new(start, self.task.step_s) {
+            None => Vec::new(),
+            Some(Checked::Aic(params)) => self.metrics(&params),
+            Some(Checked::Mrac(params)) => self.metrics(&*params),
+        };
         let worst = |goal: Goal| found.iter().map(|run| self.scoring.figure(goal, run)).fold(0.0, f64::max);
         goals.with_start(worst)
     }
@@ -121,25 +127,21 @@ impl<const N: usize> Batch<N> {
     }
 
     /// Plants with the noise and the gains that they run with.
-    fn runs<'a>(
-        &'a self,
-        plants: &'a [(u64, Plant<N>)],
-        params: &'a AicParams<N>,
-    ) -> Vec<(Run<'a, N>, &'a AicParams<N>)> {
+    fn runs<'a, P: Parameters<N>>(&'a self, plants: &'a [(u64, Plant<N>)], params: &'a P) -> Vec<(Run<'a, N>, &'a P)> {
         let run =
             |(index, plant): &'a (u64, Plant<N>)| (Run { plant, task: &self.task, noise: self.noise(*index) }, params);
         plants.iter().map(run).collect()
     }
 
     /// The figures of one run on each plant.
-    fn metrics(&self, params: &AicParams<N>) -> Vec<Metrics> {
+    fn metrics<P: Parameters<N>>(&self, params: &P) -> Vec<Metrics> {
         // As many plants at a time as run side by side.
         let bundles = self.plants.par_chunks(InstructionSet::widest().lanes());
         bundles.flat_map_iter(|plants| simulate_many(&self.runs(plants, params))).collect()
     }
 
     /// One run on each plant. Costs one simulation of the scenario per plant.
-    pub fn run(&self, params: &AicParams<N>) -> Vec<PlantResult> {
+    pub fn run<P: Parameters<N>>(&self, params: &P) -> Vec<PlantResult> {
         let found = self.metrics(params);
         let result = |(metrics, (index, _)): (Metrics, &(u64, Plant<N>))| PlantResult {
             plant: *index,
@@ -153,7 +155,7 @@ impl<const N: usize> Batch<N> {
     /// runs cost at least, and all stop when the plants together cost too much, or one has diverged or gone beyond a limit.
     ///
     /// Which thread sees it first depends on the hour; the answer does not, as whatever is worse than `enough` is answered alike.
-    pub fn outcome(&self, params: &AicParams<N>, enough: Option<Finite>) -> Outcome {
+    pub fn outcome<P: Parameters<N>>(&self, params: &P, enough: Option<Finite>) -> Outcome {
         let Some(enough) = enough else {
             return self.scoring.of_batch(self.metrics(params).iter().map(|run| self.scoring.of_run(run)));
         };
@@ -197,18 +199,18 @@ impl<const N: usize> Batch<N> {
         outcome
     }
 
-    /// Puts the plants on which `params` fare worst first; what they say together stays the same.
+    /// Puts the plants on which `gains` fare worst first; what they say together stays the same.
     #[must_use]
-    pub fn hardest_first(mut self, params: &AicParams<N>) -> Self {
-        let mut found: Vec<(Outcome, (u64, Plant<N>))> =
-            self.run(params).iter().map(|plant| plant.outcome).zip(core::mem::take(&mut self.plants)).collect();
-        found.sort_by(|(a, _), (b, _)| b.cmp(a));
-        self.plants = found.into_iter().map(|(_, plant)| plant).collect();
+    pub fn hardest_first(mut self, gains: &Gains) -> Self {
+        let found = self.judge(gains).plants;
+        if found.is_empty() {
+            return self;
+        }
+        let outcomes = found.iter().map(|plant| plant.outcome);
+        let mut plants: Vec<_> = outcomes.zip(core::mem::take(&mut self.plants)).collect();
+        plants.sort_by(|(a, _), (b, _)| b.cmp(a));
+        self.plants = plants.into_iter().map(|(_, plant)| plant).collect();
         self
-    }
-
-    fn params(&self, gains: &Gains) -> Option<AicParams<N>> {
-        AicParams::new(&gains.on_every_joint(), self.task.step_s).ok()
     }
 }
 
@@ -219,10 +221,11 @@ fn no_controller() -> Outcome {
 
 impl<const N: usize> Judge for Batch<N> {
     fn judge(&self, gains: &Gains) -> Verdict {
-        let Some(params) = self.params(gains) else {
-            return Verdict { outcome: no_controller(), plants: Vec::new() };
+        let plants = match Checked::new(gains, self.task.step_s) {
+            None => return Verdict { outcome: no_controller(), plants: Vec::new() },
+            Some(Checked::Aic(params)) => self.run(&params),
+            Some(Checked::Mrac(params)) => self.run(&*params),
         };
-        let plants = self.run(&params);
         Verdict { outcome: self.scoring.of_batch(plants.iter().map(|plant| plant.outcome)), plants }
     }
 }
@@ -240,15 +243,15 @@ impl Prover for () {
     }
 }
 
-/// The objective of a search for gains of the active inference controller: the stability filter, then what is proved, then the batch, each only where a goal asks for it.
+/// The objective of a search for gains of either controller: the stability filter, then what is proved, then the batch, each only where a goal asks for it.
 #[derive(Clone)]
-pub struct AicObjective<'a, const N: usize> {
+pub struct SimulatedObjective<'a, const N: usize> {
     batch: Batch<N>,
     filter: StabilityFilter<N>,
     prover: &'a dyn Prover,
 }
 
-impl<const N: usize> AicObjective<'static, N> {
+impl<const N: usize> SimulatedObjective<'static, N> {
     /// The settling cost on the first `plants` plants of `seed`, behind a filter of `filter_samples` samples.
     ///
     /// # Errors
@@ -266,19 +269,17 @@ impl<const N: usize> AicObjective<'static, N> {
     }
 }
 
-impl<const N: usize> AicObjective<'_, N> {
+impl<const N: usize> SimulatedObjective<'_, N> {
     /// Other goals on the same plants, where `prover` answers those that are proved. Limits must be numbers: see [`Batch::resolved`].
     #[must_use]
-    pub fn with_goals<'b>(self, goals: &Goals, prover: &'b dyn Prover) -> AicObjective<'b, N> {
-        AicObjective { batch: self.batch.with_goals(goals), filter: self.filter, prover }
+    pub fn with_goals<'b>(self, goals: &Goals, prover: &'b dyn Prover) -> SimulatedObjective<'b, N> {
+        SimulatedObjective { batch: self.batch.with_goals(goals), filter: self.filter, prover }
     }
 
     /// The plants on which `gains` fare worst come first, so that a candidate that is not good enough is known soon. Outcomes do not change.
     #[must_use]
     pub fn hardest_first(mut self, gains: &Gains) -> Self {
-        if let Some(params) = self.batch.params(gains) {
-            self.batch = self.batch.hardest_first(&params);
-        }
+        self.batch = self.batch.hardest_first(gains);
         self
     }
 
@@ -293,10 +294,10 @@ impl<const N: usize> AicObjective<'_, N> {
     }
 
     /// The figures of the goals that no run answers, or what becomes of gains without them.
-    fn unsimulated(
+    fn unsimulated<P: Parameters<N>>(
         &self,
         gains: &Gains,
-        params: &AicParams<N>,
+        params: &P,
         growth_per_s: Finite,
     ) -> Result<Vec<(Goal, f64)>, Outcome> {
         let goals = self.batch.scoring.goals();
@@ -313,16 +314,13 @@ impl<const N: usize> AicObjective<'_, N> {
         }
         Ok(figures)
     }
-}
 
-impl<const N: usize> Objective for AicObjective<'_, N> {
-    fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
-        let Some(params) = self.batch.params(gains) else { return no_controller() };
-        let growth_per_s = self.filter.growth_per_s(&params);
+    fn outcome<P: Parameters<N>>(&self, gains: &Gains, params: &P, enough: Option<Finite>) -> Outcome {
+        let growth_per_s = self.filter.growth_per_s(params);
         if growth_per_s.get() >= 0.0 {
             return Outcome::Unstable { abscissa_per_s: growth_per_s };
         }
-        let figures = match self.unsimulated(gains, &params, growth_per_s) {
+        let figures = match self.unsimulated(gains, params, growth_per_s) {
             Ok(figures) => figures,
             Err(refused) => return refused,
         };
@@ -343,12 +341,22 @@ impl<const N: usize> Objective for AicObjective<'_, N> {
             (Some(found), _) if goals.from(Source::Simulated).is_empty() => excess.judge(found),
             (None, Some(enough)) if excess.is_any() => Outcome::Stopped { cost_above: enough },
             (found, enough) => {
-                let simulated = self.batch.outcome(&params, if found.is_some() { None } else { enough });
+                let simulated = self.batch.outcome(params, if found.is_some() { None } else { enough });
                 excess.judge(match (simulated, found) {
                     (Outcome::Simulated { .. }, Some(found)) => found,
                     _ => simulated,
                 })
             }
+        }
+    }
+}
+
+impl<const N: usize> Objective for SimulatedObjective<'_, N> {
+    fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
+        match Checked::new(gains, self.batch.task.step_s) {
+            None => no_controller(),
+            Some(Checked::Aic(params)) => self.outcome(gains, &params, enough),
+            Some(Checked::Mrac(params)) => self.outcome(gains, &*params, enough),
         }
     }
 }

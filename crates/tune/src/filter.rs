@@ -11,18 +11,17 @@
 //! configurations within the joint limits, each with a plant. Every third plant is the lightest of the box, every third the heaviest, both with the least
 //! friction (light arms lose stability to sampling and delay, heavy arms to slow integration), the others are drawn.
 //!
-//! Limits: a sample proves nothing between its points. Cost: two eigenvalue problems of order 6N each.
+//! Limits: a sample proves nothing between its points, and the adaptive controller's gains are taken as frozen with nothing accumulated. Cost: two eigenvalue problems of order 6N
+//! each, 3N for the adaptive controller.
 
-use certune_closed_loop::{
-    MAX_DELAY_SAMPLES, PlantBox, PlantError, PlantSetting, Scenario, Task, linearise_aic, linearise_aic_sampled,
-};
-use certune_control::aic::AicParams;
+use certune_closed_loop::{Gains, MAX_DELAY_SAMPLES, Parameters, PlantBox, PlantError, PlantSetting, Scenario, Task};
 use certune_dynamics::{Model, Robot};
 use certune_linsys::Joints;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{RngCore, SeedableRng};
 use rayon::prelude::*;
 
+use crate::checked::Checked;
 use crate::outcome::Finite;
 use crate::streams;
 
@@ -91,10 +90,11 @@ impl<const N: usize> StabilityFilter<N> {
 
     /// The longest delay, in whole samples of the controller, up to which every sampled loop decays, s; from the box's largest delay on, 0 when it is not borne, and
     /// at most [`MAX_DELAY_SAMPLES`].
-    pub fn delay_margin_s(&self, params: &AicParams<N>, step_s: f64) -> f64 {
+    pub fn delay_margin_s<P: Parameters<N>>(&self, params: &P, step_s: f64) -> f64 {
         let margin = |FilterSample { model, q }: &FilterSample<N>| {
             let decays = |delay: &usize| {
-                linearise_aic_sampled(model, q, params, self.gravity_compensation, *delay)
+                params
+                    .linearised_sampled(model, q, self.gravity_compensation, *delay)
                     .is_ok_and(|found| found.decay_per_s() > 0.0)
             };
             (self.delay_samples..=MAX_DELAY_SAMPLES).take_while(decays).last().unwrap_or(0)
@@ -102,13 +102,22 @@ impl<const N: usize> StabilityFilter<N> {
         self.samples.par_iter().map(margin).min().unwrap_or(MAX_DELAY_SAMPLES) as f64 * step_s
     }
 
+    /// [`StabilityFilter::growth_per_s`] of a candidate; none when its gains make no controller.
+    pub fn growth_of(&self, gains: &Gains, step_s: f64) -> Option<Finite> {
+        Checked::new(gains, step_s).map(|checked| match checked {
+            Checked::Aic(params) => self.growth_per_s(&params),
+            Checked::Mrac(params) => self.growth_per_s(&*params),
+        })
+    }
+
     /// The largest growth rate over the sample, 1/s: negative when every loop decays. A loop that overflows grows as fast as a number can.
-    pub fn growth_per_s(&self, params: &AicParams<N>) -> Finite {
+    pub fn growth_per_s<P: Parameters<N>>(&self, params: &P) -> Finite {
         let compensated = self.gravity_compensation;
         let growth = |FilterSample { model, q }: &FilterSample<N>| {
-            let continuous = linearise_aic(model, q, params, compensated)
-                .map_or(f64::INFINITY, |found| found.spectral_abscissa_per_s());
-            let sampled = linearise_aic_sampled(model, q, params, compensated, self.delay_samples)
+            let continuous =
+                params.linearised(model, q, compensated).map_or(f64::INFINITY, |found| found.spectral_abscissa_per_s());
+            let sampled = params
+                .linearised_sampled(model, q, compensated, self.delay_samples)
                 .map_or(f64::INFINITY, |found| -found.decay_per_s());
             Finite::saturating(continuous).max(Finite::saturating(sampled))
         };

@@ -6,8 +6,8 @@
 #![forbid(unsafe_code)]
 
 pub mod batch;
+mod checked;
 pub mod filter;
-mod gains;
 pub mod goals;
 pub mod outcome;
 pub mod record;
@@ -17,14 +17,14 @@ pub mod space;
 pub mod streams;
 pub mod tune;
 
-pub use batch::{AicObjective, Batch, BatchError, Prover};
+pub use batch::{Batch, BatchError, Prover, SimulatedObjective};
+pub use certune_closed_loop::Gains;
 pub use filter::StabilityFilter;
-pub use gains::{Gain, Gains, NotShared};
 pub use goals::{Bound, Excess, Goal, GoalError, Goals, Limit, Reference, Source};
 pub use outcome::{Finite, NotFinite, Outcome};
-pub use record::{Attempt, Figures, HeldOut, PlantResult, Question, RunRecord, Sensitivity, Verdict};
+pub use record::{Attempt, Figures, HeldOut, PlantResult, Question, RunRecord, Sensitivity, SpaceRecord, Verdict};
 pub use search::{
     Candidate, Evaluation, Objective, Phase, Progress, SearchError, SearchRun, SearchSettings, Termination, search,
 };
-pub use space::{Freedom, Method, Range, Scale, Space, SpaceError};
+pub use space::{Knob, Method, Range, Scale, Setting, Space, SpaceError, SpaceFile, Tie};
 pub use tune::{Bench, Judge, Stage, TuneError, TuneProgress, Tuned, tune};

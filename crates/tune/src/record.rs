@@ -4,13 +4,13 @@
 
 use std::collections::BTreeMap;
 
+use certune_closed_loop::{Gains, PerJoint};
 use serde::{Deserialize, Serialize};
 
-use crate::gains::{Gain, Gains};
 use crate::goals::{Goal, Goals, Source};
 use crate::outcome::Outcome;
 use crate::search::{Evaluation, SearchSettings, Termination};
-use crate::space::{Freedom, Space};
+use crate::space::{Knob, Space};
 
 /// The version of the record that this crate writes.
 pub const RECORD_SCHEMA: u32 = 4;
@@ -39,14 +39,21 @@ pub struct Question {
     pub certification_attempts: usize,
 }
 
-/// One gain of the space.
+/// Where was searched.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SpaceGain {
-    /// The gain.
-    pub gain: Gain,
-    /// Its fixed value or its range.
-    pub freedom: Freedom,
+pub struct SpaceRecord {
+    /// The rows that stayed.
+    pub fixed: BTreeMap<String, PerJoint>,
+    /// What moved the others, in the order of the coordinates.
+    pub knobs: Vec<Knob>,
+}
+
+impl From<&Space> for SpaceRecord {
+    fn from(space: &Space) -> Self {
+        let fixed = space.fixed().map(|(row, numbers)| (row.to_owned(), numbers.clone()));
+        Self { fixed: fixed.collect(), knobs: space.knobs().to_vec() }
+    }
 }
 
 /// A visit to the certifier.
@@ -143,15 +150,15 @@ pub struct Verdict {
     pub plants: Vec<PlantResult>,
 }
 
-/// What a change of one gain of the winner does to the outcome on the batch.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// What a change of one knob of the winner does to the outcome on the batch.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sensitivity {
-    /// The gain.
-    pub gain: Gain,
-    /// With the gain times 0.9.
+    /// The knob.
+    pub knob: String,
+    /// With every gain that it sets times 0.9.
     pub at_minus_10_percent: Outcome,
-    /// With the gain times 1.1.
+    /// With every gain that it sets times 1.1.
     pub at_plus_10_percent: Outcome,
 }
 
@@ -164,7 +171,7 @@ pub struct RunRecord {
     /// What was asked.
     pub question: Question,
     /// Where was searched.
-    pub space: Vec<SpaceGain>,
+    pub space: SpaceRecord,
     /// Every candidate in order, with its final rank.
     pub evaluations: Vec<Evaluation>,
     /// Why the search ended.
@@ -177,7 +184,7 @@ pub struct RunRecord {
     pub winner: Option<usize>,
     /// What plants say that the search never saw.
     pub held_out: HeldOut,
-    /// How much each free gain of the winner matters.
+    /// How much each knob of the winner matters.
     pub sensitivity: Vec<Sensitivity>,
 }
 
@@ -196,9 +203,4 @@ impl RunRecord {
     pub fn tuned(&self) -> Option<&Gains> {
         self.winner().map(|evaluation| &evaluation.gains)
     }
-}
-
-/// The rows of a space, in the order of a file.
-pub(crate) fn space_rows(space: &Space) -> Vec<SpaceGain> {
-    Gain::ALL.into_iter().map(|gain| SpaceGain { gain, freedom: space.freedom(gain) }).collect()
 }

@@ -4,21 +4,21 @@
 //! 2. The candidates that finished the task, or met the objective otherwise, go before the certifier from the lowest cost upwards until one is certified. A candidate closer than
 //!    [`NEIGHBOUR`] in every coordinate to one that was refused is passed over: its certificate would fail for the same reason.
 //!    When the attempts are used up without a certificate, the start is tried last.
-//! 3. Start and winner run on plants that the search never saw, and each free gain of the winner is changed by ±10 %.
+//! 3. Start and winner run on plants that the search never saw, and each knob of the winner is changed by ±10 %.
 //!
 //! The certifier is a closure, so this module knows nothing about proofs: whoever calls it decides what "certified" means, and keeps the evidence.
 
 use core::fmt::Display;
 
+use certune_closed_loop::Gains;
 use rayon::prelude::*;
 
-use crate::gains::Gains;
 use crate::outcome::Outcome;
-use crate::record::{Attempt, HeldOut, Question, RECORD_SCHEMA, RunRecord, Sensitivity, Verdict, space_rows};
+use crate::record::{Attempt, HeldOut, Question, RECORD_SCHEMA, RunRecord, Sensitivity, SpaceRecord, Verdict};
 use crate::search::{Evaluation, Objective, Progress, SearchError, SearchRun, search};
-use crate::space::Space;
+use crate::space::{Knob, Space};
 
-/// Distance, as a fraction of each gain's range, below which two candidates share the fate of one certificate.
+/// Distance, as a fraction of each knob's range, below which two candidates share the fate of one certificate.
 pub const NEIGHBOUR: f64 = 0.01;
 
 /// Plants that the search never sees.
@@ -110,15 +110,19 @@ pub fn tune<C, R: Display>(
 
     progress.stage(Stage::Judge);
     let winner_index = winner.as_ref().map(|(index, _)| *index);
-    let gains_at = |index: Option<usize>| index.and_then(|index| run.evaluations.get(index)).map(|found| found.gains);
+    let gains_at =
+        |index: Option<usize>| index.and_then(|index| run.evaluations.get(index)).map(|found| found.gains.clone());
     let (start_gains, tuned_gains) = (gains_at(start), gains_at(winner_index));
     let start_verdict = start_gains.map(|gains| judge.judge(&gains));
-    let tuned_verdict =
-        if winner_index == start { start_verdict.clone() } else { tuned_gains.map(|gains| judge.judge(&gains)) };
+    let tuned_verdict = if winner_index == start {
+        start_verdict.clone()
+    } else {
+        tuned_gains.as_ref().map(|gains| judge.judge(gains))
+    };
     let record = RunRecord {
         schema: RECORD_SCHEMA,
         question,
-        space: space_rows(space),
+        space: SpaceRecord::from(space),
         termination: run.termination,
         certification,
         start,
@@ -199,15 +203,12 @@ fn are_neighbours(a: &[f64], b: &[f64]) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() < NEIGHBOUR)
 }
 
-/// What a change of each free gain by ±10 % does to the outcome; the bounds of the space do not apply. Costs two evaluations per free gain.
+/// What a change of each knob by ±10 % does to the outcome; the bounds of the space do not apply. Costs two evaluations per knob.
 pub fn sensitivity(space: &Space, objective: &dyn Objective, gains: &Gains) -> Vec<Sensitivity> {
-    let free: Vec<_> = space.free().map(|(gain, _)| gain).collect();
-    let outcome = |gain, factor: f64| objective.evaluate(&gains.with(gain, gains.get(gain) * factor), None);
-    free.into_par_iter()
-        .map(|gain| Sensitivity {
-            gain,
-            at_minus_10_percent: outcome(gain, 0.9),
-            at_plus_10_percent: outcome(gain, 1.1),
-        })
-        .collect()
+    let changed = |knob: &Knob| Sensitivity {
+        knob: knob.name.clone(),
+        at_minus_10_percent: objective.evaluate(&knob.scaled(gains, 0.9), None),
+        at_plus_10_percent: objective.evaluate(&knob.scaled(gains, 1.1), None),
+    };
+    space.knobs().par_iter().map(changed).collect()
 }

@@ -1,20 +1,24 @@
 //! The search on the arm itself: what the filter rejects runs away, what is found is better on plants it never met, threads do not matter.
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use certune_closed_loop::{GainsFile, Scenario};
-use certune_control::aic::AicParams;
-use certune_dynamics::Robot;
+use certune_dynamics::{Joints, Model, Robot, mass_matrix};
 use certune_tune::filter::DEFAULT_SAMPLES;
 use certune_tune::{
-    AicObjective, Batch, BatchError, Bench, Finite, Gain, Gains, Goals, Judge, Method, Objective, Outcome, Question,
-    SearchSettings, Space, tune,
+    Batch, BatchError, Bench, Finite, Gains, Goals, Judge, Method, Objective, Outcome, Question, SearchSettings,
+    Setting, SimulatedObjective, Space, SpaceError, SpaceFile, tune,
 };
+use common::Numbers;
 
 const SCENARIO: &str = include_str!("../../../tuning/scenarios/pick-and-place.toml");
 const SPACE: &str = include_str!("../../../tuning/spaces/panda-aic.toml");
 const PRESET: &str = include_str!("../../../tuning/presets/pezzato2020-simulation.toml");
+const MRAC_SPACE: &str = include_str!("../../../tuning/spaces/panda-mrac.toml");
+const MRAC_PRESET: &str = include_str!("../../../tuning/presets/pezzato2020-mrac-simulation.toml");
 const PER_JOINT_PRESET: &str = include_str!("../../../tuning/presets/pezzato2020-robot.toml");
 
 /// The default task, its first `goals` goals of `duration_s` each.
@@ -27,16 +31,21 @@ fn scenario(goals: usize, duration_s: f64) -> Scenario {
     scenario
 }
 
-fn preset(text: &str) -> Result<Gains, certune_tune::NotShared> {
-    let file = GainsFile::parse(Path::new("preset.toml"), text).expect("a valid preset");
-    match file.gains {
-        certune_closed_loop::Gains::Aic(table) => Gains::from_table(&table),
-        certune_closed_loop::Gains::Mrac(_) => unreachable!("the preset is of the other controller"),
-    }
+fn preset(text: &str) -> Gains {
+    GainsFile::parse(Path::new("preset.toml"), text).expect("a valid preset").gains
 }
 
 fn published() -> Gains {
-    preset(PRESET).expect("gains that all joints share")
+    preset(PRESET)
+}
+
+fn space(text: &str, start: &Gains) -> Result<Space, SpaceError> {
+    let robot = Robot::panda();
+    let model = Model::<7>::new(&robot).expect("an arm");
+    let inertia = mass_matrix(&model, &Joints::from_fn(|joint, _| scenario(1, 1.0).start_rad[joint]));
+    let inertia_kg_m2: Vec<f64> = inertia.diagonal().iter().copied().collect();
+    let file = SpaceFile::parse(Path::new("space.toml"), text).expect("the shipped space");
+    file.on(Setting { start: Some(start), inertia_kg_m2: Some(&inertia_kg_m2) })
 }
 
 #[test]
@@ -56,10 +65,10 @@ fn the_published_gains_settle_as_the_literature_says() {
 fn what_the_filter_rejects_runs_away_or_never_settles() {
     let robot = Robot::panda();
     let scenario = scenario(1, 6.0);
-    let objective = AicObjective::<7>::new(&robot, &scenario, 1, 2, DEFAULT_SAMPLES).unwrap();
+    let objective = SimulatedObjective::<7>::new(&robot, &scenario, 1, 2, DEFAULT_SAMPLES).unwrap();
     assert!(matches!(objective.evaluate(&published(), None), Outcome::Simulated { .. }));
     // The published reference behaviour: sigma_dq = 5 runs away.
-    let restless = published().with(Gain::SigmaDq, 5.0);
+    let restless = published().holding("sigma_dq", 5.0);
     assert!(
         matches!(objective.evaluate(&restless, None), Outcome::Unstable { .. }),
         "{:?}",
@@ -76,21 +85,18 @@ fn what_the_filter_rejects_runs_away_or_never_settles() {
 #[test]
 fn the_filter_sees_the_slowest_mode_and_an_euler_step_that_is_too_long() {
     let robot = Robot::panda();
-    let objective = AicObjective::<7>::new(&robot, &scenario(1, 6.0), 1, 1, DEFAULT_SAMPLES).unwrap();
-    let growth_per_s = |gains: &Gains| {
-        let params = AicParams::new(&gains.on_every_joint(), 1e-3).unwrap();
-        objective.filter().growth_per_s(&params).get()
-    };
+    let objective = SimulatedObjective::<7>::new(&robot, &scenario(1, 6.0), 1, 1, DEFAULT_SAMPLES).unwrap();
+    let growth_per_s = |gains: &Gains| objective.filter().growth_of(gains, 1e-3).expect("a controller").get();
     // The slowest mode of the published gains is the reference's, about 1 /s.
     assert!((-1.2..-0.8).contains(&growth_per_s(&published())), "{}", growth_per_s(&published()));
-    assert!(growth_per_s(&published().with(Gain::KappaMu, 2000.0)) > 0.0, "an Euler step of 2 leak rates is unstable");
+    assert!(growth_per_s(&published().holding("kappa_mu", 2000.0)) > 0.0, "an Euler step of 2 leak rates is unstable");
     assert_eq!(objective.filter().len(), DEFAULT_SAMPLES);
 }
 
 #[test]
 fn gains_that_make_no_controller_are_the_worst_outcome() {
-    let objective = AicObjective::<7>::new(&Robot::panda(), &scenario(1, 0.1), 1, 1, 3).unwrap();
-    let none = objective.evaluate(&published().with(Gain::SigmaMu, 0.0), None);
+    let objective = SimulatedObjective::<7>::new(&Robot::panda(), &scenario(1, 0.1), 1, 1, 3).unwrap();
+    let none = objective.evaluate(&published().holding("sigma_mu", 0.0), None);
     assert!(matches!(none, Outcome::Diverged { at_s } if at_s.get() == 0.0), "{none:?}");
 }
 
@@ -111,17 +117,16 @@ fn batch_and_held_out_plants_are_disjoint_and_a_batch_is_never_empty() {
 
 #[test]
 fn gains_per_joint_are_no_start_and_the_error_names_the_gain() {
-    let error = preset(PER_JOINT_PRESET).unwrap_err();
-    assert_eq!(error.gain, Gain::SigmaQ);
-    assert!(error.to_string().contains("sigma_q"), "{error}");
+    let error = space(SPACE, &preset(PER_JOINT_PRESET)).unwrap_err().to_string();
+    assert!(error.contains("sigma_q = 10") && error.contains("search.start"), "{error}");
 }
 
 #[test]
 fn a_candidate_is_given_up_exactly_when_it_is_worse_than_what_is_enough() {
     let objective =
-        AicObjective::<7>::new(&Robot::panda(), &scenario(2, 3.0), 3, 6, 3).unwrap().hardest_first(&published());
-    let slow = published().with(Gain::KappaA, 300.0);
-    for gains in [published(), slow, published().with(Gain::SigmaDmu, 5.0)] {
+        SimulatedObjective::<7>::new(&Robot::panda(), &scenario(2, 3.0), 3, 6, 3).unwrap().hardest_first(&published());
+    let slow = published().holding("kappa_a", 300.0);
+    for gains in [published(), slow, published().holding("sigma_dmu", 5.0)] {
         let exact = objective.evaluate(&gains, None);
         let Outcome::Simulated { cost } = exact else { panic!("{exact:?}") };
         for factor in [0.1, 0.5, 0.9, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 2.0] {
@@ -134,12 +139,13 @@ fn a_candidate_is_given_up_exactly_when_it_is_worse_than_what_is_enough() {
 
 #[test]
 fn the_order_of_the_plants_does_not_change_an_outcome() {
-    let objective = AicObjective::<7>::new(&Robot::panda(), &scenario(1, 2.0), 3, 6, 3).unwrap();
+    let objective = SimulatedObjective::<7>::new(&Robot::panda(), &scenario(1, 2.0), 3, 6, 3).unwrap();
     let sorted = objective.clone().hardest_first(&published());
-    let order =
-        |objective: &AicObjective<7>| objective.batch().plants().iter().map(|(index, _)| *index).collect::<Vec<_>>();
+    let order = |objective: &SimulatedObjective<7>| {
+        objective.batch().plants().iter().map(|(index, _)| *index).collect::<Vec<_>>()
+    };
     assert_ne!(order(&objective), order(&sorted), "a batch that is sorted by chance tests nothing");
-    let gains = published().with(Gain::KappaA, 500.0);
+    let gains = published().holding("kappa_a", 500.0);
     assert_eq!(objective.evaluate(&gains, None), sorted.evaluate(&gains, None));
 }
 
@@ -147,8 +153,9 @@ fn the_order_of_the_plants_does_not_change_an_outcome() {
 fn stopping_early_changes_no_candidate_and_no_winner() {
     let with = run(Method::ParticleSwarm, 2, true);
     let without = run(Method::ParticleSwarm, 2, false);
-    let gains =
-        |record: &certune_tune::RunRecord| record.evaluations.iter().map(|found| found.gains).collect::<Vec<_>>();
+    let gains = |record: &certune_tune::RunRecord| {
+        record.evaluations.iter().map(|found| found.gains.clone()).collect::<Vec<_>>()
+    };
     assert_eq!(gains(&with), gains(&without));
     assert_eq!((with.winner, with.tuned()), (without.winner, without.tuned()));
     let stopped = |outcome: &Outcome| matches!(outcome, Outcome::Stopped { .. });
@@ -162,28 +169,47 @@ fn stopping_early_changes_no_candidate_and_no_winner() {
     }
 }
 
-/// A small tuning run: one goal, two plants.
+/// A small tuning run of the AIC: one goal, two plants.
 fn run(method: Method, threads: usize, stop_early: bool) -> certune_tune::RunRecord {
+    let search = SearchSettings { particles: 6, stop_early, ..SearchSettings::new(method, 36, 5) };
+    run_of(&published(), SPACE, search, threads)
+}
+
+fn run_of(start: &Gains, space_text: &str, search: SearchSettings, threads: usize) -> certune_tune::RunRecord {
     let robot = Robot::panda();
     let scenario = scenario(1, 4.0);
-    let space = Space::parse(Path::new("panda-aic.toml"), SPACE).expect("the shipped space");
+    let space = space(space_text, start).expect("a start in the space");
     let question = Question {
         robot: robot.name().to_owned(),
         robot_sha256: robot.sha256(),
         scenario: scenario.name.clone(),
         versions: BTreeMap::new(),
         goals: Goals::default(),
-        search: SearchSettings { particles: 6, stop_early, ..SearchSettings::new(method, 36, 5) },
+        search,
         batch_plants: 2,
         held_out_plants: 3,
         certification_attempts: 3,
     };
-    let objective = AicObjective::<7>::new(&robot, &scenario, 5, question.batch_plants, 6).expect("plants that fit");
+    let objective =
+        SimulatedObjective::<7>::new(&robot, &scenario, 5, question.batch_plants, 6).expect("plants that fit");
     let judge = Batch::<7>::held_out(&robot, &scenario, 5, question.held_out_plants).expect("plants that fit");
     let bench = Bench { objective: &objective, judge: &judge, progress: &() };
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     let certify = |_: &Gains| Ok::<_, &str>(());
-    pool.install(|| tune(question, &space, Some(&published()), bench, certify)).expect("a valid run").record
+    pool.install(|| tune(question, &space, Some(start), bench, certify)).expect("a valid run").record
+}
+
+#[test]
+fn mrac_is_tuned_by_the_same_search_and_threads_do_not_matter() {
+    let start = preset(MRAC_PRESET);
+    let run = |threads| run_of(&start, MRAC_SPACE, SearchSettings::new(Method::Schedule, 60, 5), threads);
+    let one = run(1);
+    let [before, after] = [&one.held_out.start, &one.held_out.tuned].map(|verdict| verdict.as_ref().unwrap().outcome);
+    assert!(after < before, "{before:?} {after:?}");
+    let text = |record: &certune_tune::RunRecord| serde_json::to_string_pretty(record).unwrap();
+    assert_eq!(text(&one), text(&run(2)));
+    let read: certune_tune::RunRecord = serde_json::from_str(&text(&one)).unwrap();
+    assert_eq!(read, one);
 }
 
 #[test]

@@ -1,34 +1,22 @@
 //! The search finds known minima, spends its budget exactly, and does not depend on the number of threads.
 
+mod common;
+
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use certune_tune::{
-    Candidate, Evaluation, Finite, Freedom, Gain, Gains, Method, Objective, Outcome, Phase, Progress, Range, Scale,
-    SearchError, SearchSettings, Space, SpaceError, Termination, search,
+    Candidate, Evaluation, Finite, Gains, Method, Objective, Outcome, Phase, Progress, SearchError, SearchSettings,
+    Space, SpaceError, Termination, search,
 };
+use common::{Numbers, ones, space_of};
 use proptest::prelude::*;
 
 /// A space whose free gains are the first `free` of the list, each over `[0.01, 100]`.
 fn space(free: usize) -> Space {
-    let range = Freedom::Free(Range { lower: 0.01, upper: 100.0, scale: Scale::Log });
-    let order = [Gain::KappaMu, Gain::KappaA, Gain::SigmaDq, Gain::SigmaMu, Gain::SigmaDmu];
-    let freedoms = Gain::ALL.map(|gain| if order[..free].contains(&gain) { range } else { Freedom::Fixed(1.0) });
-    Space::new(Method::NelderMead, None, freedoms).expect("a valid space")
+    space_of(&["kappa_mu", "kappa_a", "sigma_dq", "sigma_mu", "sigma_dmu"][..free], [0.01, 100.0])
 }
 
 const METHODS: [Method; 4] = [Method::Schedule, Method::CmaEs, Method::NelderMead, Method::ParticleSwarm];
-
-fn ones() -> Gains {
-    Gains {
-        kappa_mu: 1.0,
-        kappa_a: 1.0,
-        sigma_q: 1.0,
-        sigma_dq: 1.0,
-        sigma_mu: 1.0,
-        sigma_dmu: 1.0,
-        reference_time_constant_s: 1.0,
-    }
-}
 
 fn simulated(cost_s: f64) -> Outcome {
     Outcome::Simulated { cost: Finite::saturating(cost_s) }
@@ -36,28 +24,22 @@ fn simulated(cost_s: f64) -> Outcome {
 
 /// Squared distance, in natural logarithms, to a point that is far from the start in every gain.
 fn bowl(gains: &Gains) -> Outcome {
-    let squares = [
-        (Gain::KappaMu, 3.0_f64),
-        (Gain::KappaA, 0.2),
-        (Gain::SigmaDq, 5.0),
-        (Gain::SigmaMu, 0.5),
-        (Gain::SigmaDmu, 2.0),
-    ];
-    simulated(squares.iter().map(|(gain, at)| (gains.get(*gain) / at).ln().powi(2)).sum())
+    let squares = [("kappa_mu", 3.0_f64), ("kappa_a", 0.2), ("sigma_dq", 5.0), ("sigma_mu", 0.5), ("sigma_dmu", 2.0)];
+    simulated(squares.iter().map(|(gain, at)| (gains.number(gain) / at).ln().powi(2)).sum())
 }
 
 /// Rosenbrock's valley in the logarithms of two gains; minimum 0 at ln = (1, 1).
 fn valley(gains: &Gains) -> Outcome {
-    let (x, y) = (gains.kappa_mu.ln(), gains.kappa_a.ln());
+    let (x, y) = (gains.number("kappa_mu").ln(), gains.number("kappa_a").ln());
     simulated(100.0 * (y - x * x).powi(2) + (1.0 - x).powi(2))
 }
 
 /// A bowl with a cliff: half of the space is unstable, a corner of it diverges.
 fn cliff(gains: &Gains) -> Outcome {
-    if gains.kappa_mu * gains.kappa_a > 50.0 {
-        Outcome::Diverged { at_s: Finite::saturating(100.0 / gains.kappa_mu) }
-    } else if gains.kappa_mu > 3.5 {
-        Outcome::Unstable { abscissa_per_s: Finite::saturating(gains.kappa_mu - 3.5) }
+    if gains.number("kappa_mu") * gains.number("kappa_a") > 50.0 {
+        Outcome::Diverged { at_s: Finite::saturating(100.0 / gains.number("kappa_mu")) }
+    } else if gains.number("kappa_mu") > 3.5 {
+        Outcome::Unstable { abscissa_per_s: Finite::saturating(gains.number("kappa_mu") - 3.5) }
     } else {
         bowl(gains)
     }
@@ -73,13 +55,13 @@ fn nelder_mead_finds_the_bottom_of_a_bowl_in_five_gains() {
     let run = search(&space(5), Some(&ones()), &settings, &bowl, &()).unwrap();
     let best = run.ranked()[0];
     assert!(cost_s(best) < 1e-6, "{best:?}");
-    assert!((best.gains.kappa_mu / 3.0 - 1.0).abs() < 1e-2, "{best:?}");
+    assert!((best.gains.number("kappa_mu") / 3.0 - 1.0).abs() < 1e-2, "{best:?}");
 }
 
 #[test]
 fn nelder_mead_follows_rosenbrocks_valley() {
     let settings = SearchSettings::new(Method::NelderMead, 300, 0);
-    let start = ones().with(Gain::KappaMu, (-1.2_f64).exp()).with(Gain::KappaA, std::f64::consts::E);
+    let start = ones().holding("kappa_mu", (-1.2_f64).exp()).holding("kappa_a", std::f64::consts::E);
     let run = search(&space(2), Some(&start), &settings, &valley, &()).unwrap();
     assert!(cost_s(run.ranked()[0]) < 1e-6, "{:?}", run.ranked()[0]);
 }
@@ -103,8 +85,7 @@ fn a_cold_swarm_finds_both() {
 
 /// A second basin, deeper than the one at the start and far from it.
 fn two_basins(gains: &Gains) -> Outcome {
-    let distance =
-        |at: f64| [Gain::KappaMu, Gain::KappaA, Gain::SigmaDq].map(|gain| (gains.get(gain) / at).ln().powi(2));
+    let distance = |at: f64| ["kappa_mu", "kappa_a", "sigma_dq"].map(|gain| (gains.number(gain) / at).ln().powi(2));
     let [here, there] = [1.3, 30.0].map(|at| distance(at).iter().sum::<f64>());
     simulated((1.0 + here).min(0.5 + there))
 }
@@ -204,8 +185,8 @@ fn settings_out_of_range_are_refused() {
     assert_eq!(run(&SearchSettings { particles: 1, ..good }), SearchError::Particles { particles: 1 });
     assert_eq!(run(&SearchSettings { simplex_step: 0.0, ..good }), SearchError::SimplexStep { simplex_step: 0.0 });
     assert!(matches!(run(&SearchSettings { simplex_step: f64::NAN, ..good }), SearchError::SimplexStep { .. }));
-    let outside = search(&space(2), Some(&ones().with(Gain::KappaA, 1e3)), &good, &bowl, &());
-    assert!(matches!(outside, Err(SearchError::Start(SpaceError::StartOutside { gain: Gain::KappaA, .. }))));
+    let outside = search(&space(2), Some(&ones().holding("kappa_a", 1e3)), &good, &bowl, &());
+    assert!(matches!(outside, Err(SearchError::Start(SpaceError::StartOutside { knob, .. })) if knob == "kappa_a"));
 }
 
 fn method() -> impl Strategy<Value = Method> {
@@ -245,7 +226,7 @@ proptest! {
         prop_assert_eq!(with.termination, without.termination);
         prop_assert_eq!(with.evaluations.len(), without.evaluations.len());
         for (with, without) in with.evaluations.iter().zip(&without.evaluations) {
-            prop_assert_eq!(with.gains, without.gains);
+            prop_assert_eq!(&with.gains, &without.gains);
             match with.outcome {
                 Outcome::Stopped { cost_above } => prop_assert!(without.outcome.cost().is_some_and(|cost| cost > cost_above.get())),
                 outcome => prop_assert_eq!(outcome, without.outcome),

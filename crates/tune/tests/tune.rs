@@ -1,39 +1,27 @@
 //! The winner is the best candidate that the certifier accepts, and the record tells how it came about.
 
+mod common;
+
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use certune_tune::{
-    Bench, Evaluation, Finite, Freedom, Gain, Gains, Goals, Judge, Method, Outcome, Progress, Question, Range,
-    RunRecord, Scale, SearchSettings, Space, Stage, TuneError, TuneProgress, Tuned, Verdict, tune,
+    Bench, Evaluation, Finite, Gains, Goals, Judge, Method, Outcome, Progress, Question, RunRecord, SearchSettings,
+    Space, Stage, TuneError, TuneProgress, Tuned, Verdict, tune,
 };
+use common::{Numbers, ones as start, space_of};
 
 fn space() -> Space {
-    let range = Freedom::Free(Range { lower: 0.1, upper: 10.0, scale: Scale::Log });
-    let freedoms =
-        Gain::ALL.map(|gain| if gain == Gain::KappaMu || gain == Gain::KappaA { range } else { Freedom::Fixed(1.0) });
-    Space::new(Method::NelderMead, None, freedoms).expect("a valid space")
-}
-
-fn start() -> Gains {
-    Gains {
-        kappa_mu: 1.0,
-        kappa_a: 1.0,
-        sigma_q: 1.0,
-        sigma_dq: 1.0,
-        sigma_mu: 1.0,
-        sigma_dmu: 1.0,
-        reference_time_constant_s: 1.0,
-    }
+    space_of(&["kappa_mu", "kappa_a"], [0.1, 10.0])
 }
 
 fn cost_s(gains: &Gains) -> f64 {
-    1.0 + (gains.kappa_mu / 4.0).ln().powi(2) + (gains.kappa_a / 0.5).ln().powi(2)
+    1.0 + (gains.number("kappa_mu") / 4.0).ln().powi(2) + (gains.number("kappa_a") / 0.5).ln().powi(2)
 }
 
 fn objective(gains: &Gains) -> Outcome {
-    if gains.kappa_a > 3.0 {
-        return Outcome::Unstable { abscissa_per_s: Finite::saturating(gains.kappa_a) };
+    if gains.number("kappa_a") > 3.0 {
+        return Outcome::Unstable { abscissa_per_s: Finite::saturating(gains.number("kappa_a")) };
     }
     Outcome::Simulated { cost: Finite::saturating(cost_s(gains)) }
 }
@@ -83,13 +71,13 @@ fn rank_is_consistent(record: &RunRecord) {
 
 #[test]
 fn the_best_candidate_wins_when_everything_is_certified() {
-    let tuned = run(5, |gains| Ok::<_, &str>(gains.kappa_mu));
+    let tuned = run(5, |gains| Ok::<_, &str>(gains.number("kappa_mu")));
     let record = &tuned.record;
     rank_is_consistent(record);
     assert_eq!(record.certification.len(), 1);
     let winner = record.winner().unwrap();
     assert!(record.evaluations.iter().all(|other| winner.outcome <= other.outcome));
-    assert_eq!(tuned.certificate, Some(winner.gains.kappa_mu));
+    assert_eq!(tuned.certificate, Some(winner.gains.number("kappa_mu")));
     assert_eq!(record.start().unwrap().gains, start());
     assert!(record.held_out.tuned.as_ref().unwrap().outcome < record.held_out.start.as_ref().unwrap().outcome);
     assert_eq!(record.sensitivity.len(), 2);
@@ -103,11 +91,12 @@ fn the_best_candidate_wins_when_everything_is_certified() {
 
 #[test]
 fn the_best_certified_candidate_wins_over_better_refused_ones() {
-    let tuned = run(1000, |gains| if gains.kappa_mu < 2.0 { Ok(()) } else { Err("too fast") });
+    let tuned = run(1000, |gains| if gains.number("kappa_mu") < 2.0 { Ok(()) } else { Err("too fast") });
     rank_is_consistent(&tuned.record);
     let winner = tuned.record.winner().unwrap();
-    assert!(winner.gains.kappa_mu < 2.0 && tuned.record.certification.len() > 1);
-    let better = |other: &&Evaluation| other.outcome.cost() < winner.outcome.cost() && other.gains.kappa_mu < 2.0;
+    assert!(winner.gains.number("kappa_mu") < 2.0 && tuned.record.certification.len() > 1);
+    let better =
+        |other: &&Evaluation| other.outcome.cost() < winner.outcome.cost() && other.gains.number("kappa_mu") < 2.0;
     assert!(tuned.record.evaluations.iter().find(better).is_none(), "a better candidate would have been certified");
 }
 
@@ -115,7 +104,7 @@ fn the_best_certified_candidate_wins_over_better_refused_ones() {
 fn near_neighbours_of_a_refused_candidate_are_passed_over() {
     let visited = Mutex::new(Vec::new());
     let tuned = run(1000, |gains| {
-        visited.lock().unwrap().push(*gains);
+        visited.lock().unwrap().push(gains.clone());
         Err::<(), _>("never")
     });
     rank_is_consistent(&tuned.record);
@@ -146,7 +135,7 @@ fn the_record_is_the_same_to_the_byte_for_any_number_of_threads() {
         let record = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let bench = Bench { objective: &objective, judge: &Held, progress: &() };
-            let certify = |gains: &Gains| if gains.kappa_mu < 2.0 { Ok(()) } else { Err("too fast") };
+            let certify = |gains: &Gains| if gains.number("kappa_mu") < 2.0 { Ok(()) } else { Err("too fast") };
             let tuned = pool.install(|| tune(question(method, 20), &space(), Some(&start()), bench, certify)).unwrap();
             serde_json::to_string_pretty(&tuned.record).unwrap()
         };

@@ -16,15 +16,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use certune::closed_loop::Scenario;
-use certune::control::aic::AicParams;
 use certune::dynamics::Robot;
 use certune::tune::filter::{DEFAULT_SAMPLES, StabilityFilter};
-use certune::tune::{
-    Candidate, Finite, Gains, Objective, Outcome, SearchError, SearchSettings, Termination, TuneError, search,
-};
+use certune::tune::{Candidate, Finite, Gains, Objective, Outcome, SearchSettings, Termination, TuneError, search};
 use serde::{Deserialize, Serialize};
 
-use super::tune::{DEFAULT_BUDGET, DEFAULT_SEED, start_of};
+use super::tune::{DEFAULT_BUDGET, DEFAULT_SEED, inertia_kg_m2, started};
 use crate::catalogue;
 use crate::cli::{AskTellArgs, Exit};
 use crate::error::Error;
@@ -156,7 +153,7 @@ struct Told<R, W> {
 
 impl<R: BufRead + Send, W: Write + Send> Objective for Told<R, W> {
     fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
-        let alone = self.evaluate_all(&[Candidate { gains: *gains, enough }]);
+        let alone = self.evaluate_all(&[Candidate { gains: gains.clone(), enough }]);
         alone.and_then(|found| found.first().copied()).unwrap_or(Outcome::Diverged { at_s: Finite::saturating(0.0) })
     }
 
@@ -185,18 +182,20 @@ impl<R: BufRead + Send, W: Write + Send> Objective for Told<R, W> {
 }
 
 pub fn run(args: &AskTellArgs) -> Result<Exit, Error> {
-    let (_, space) = catalogue::space(args.space.as_deref())?;
-    let (_, start) = start_of(&space)?;
-    space.admit(&start).map_err(|error| TuneError::from(SearchError::Start(error)))?;
-    let budget = args.budget.unwrap_or(DEFAULT_BUDGET);
-    let settings = SearchSettings::new(space.method(), budget, args.seed.unwrap_or(DEFAULT_SEED));
-    let filter = match &args.robot {
+    let (_, file) = catalogue::space(args.space.as_deref(), None)?;
+    let arm = match &args.robot {
         Some(name) => {
             let robot = catalogue::robot(name, args.tip.as_deref())?;
-            Some(filter(&robot, &catalogue::scenario(args.scenario.as_deref(), &robot)?, settings.seed)?)
+            let scenario = catalogue::scenario(args.scenario.as_deref(), &robot)?;
+            Some((inertia_kg_m2(&robot, &scenario)?, robot, scenario))
         }
         None => None,
     };
+    let inertia_kg_m2 = arm.as_ref().map(|(inertia_kg_m2, ..)| inertia_kg_m2.as_slice());
+    let (_, space, start) = started(&file, inertia_kg_m2)?;
+    let budget = args.budget.unwrap_or(DEFAULT_BUDGET);
+    let settings = SearchSettings::new(space.method(), budget, args.seed.unwrap_or(DEFAULT_SEED));
+    let filter = arm.as_ref().map(|(_, robot, scenario)| filter(robot, scenario, settings.seed)).transpose()?;
     let talk = Talk {
         input: std::io::BufReader::new(std::io::stdin()),
         output: std::io::stdout(),
@@ -245,8 +244,7 @@ fn filter(robot: &Robot, scenario: &Scenario, seed: u64) -> Result<Filter, Error
         let filter = StabilityFilter::<N>::new(robot, scenario, &task, seed, DEFAULT_SAMPLES)?;
         let step_s = task.step_s;
         let rejected = move |gains: &Gains| {
-            let params = AicParams::new(&gains.on_every_joint::<N>(), step_s).ok()?;
-            let abscissa_per_s = filter.growth_per_s(&params);
+            let abscissa_per_s = filter.growth_of(gains, step_s)?;
             (abscissa_per_s.get() >= 0.0).then_some(Outcome::Unstable { abscissa_per_s })
         };
         Ok(Box::new(rejected) as Filter)
@@ -257,17 +255,10 @@ fn filter(robot: &Robot, scenario: &Scenario, seed: u64) -> Result<Filter, Error
 #[cfg(test)]
 mod tests {
     use super::*;
+    use certune::closed_loop::AicTable;
 
     fn talk(input: &str) -> (Talk<&[u8], Vec<u8>>, Gains) {
-        let gains = Gains {
-            kappa_mu: 1.0,
-            kappa_a: 2.0,
-            sigma_q: 1.0,
-            sigma_dq: 1.0,
-            sigma_mu: 1.0,
-            sigma_dmu: 1.0,
-            reference_time_constant_s: 1.0,
-        };
+        let gains = AicTable::uniform(1.0).into();
         (Talk { input: input.as_bytes(), output: Vec::new(), line: 0, asked: 0, broken: None }, gains)
     }
 

@@ -5,23 +5,25 @@ use std::path::{Path, PathBuf};
 
 use certune::certify::FamilyValues;
 use certune::closed_loop::Scenario;
-use certune::dynamics::Robot;
+use certune::control::mrac::MracLaw;
+use certune::dynamics::{Joints, Model, Robot, mass_matrix};
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::{
-    AicObjective, Batch, BatchError, Bench, Evaluation, Gains, Goal, Goals, HeldOut, Outcome, Question, RunRecord,
-    SearchError, SearchSettings, Source, Space, TuneError, Tuned, tune,
+    Batch, BatchError, Bench, Evaluation, Gains, Goal, Goals, HeldOut, Outcome, Question, RunRecord, SearchError,
+    SearchSettings, Setting, SimulatedObjective, Source, Space, SpaceFile, TuneError, Tuned, tune,
 };
-use certune::verify::{Certificate, Claim, ClaimKind, Record, Verdict};
+use certune::verify::{Certificate, Claim, Record, Verdict};
 use certune::{ArmCertifier, Growth, Over, StabilityError, family_of};
 use serde::Serialize;
 
 use super::claims::{ClaimSummary, claims_in_words, growths, summaries};
-use crate::catalogue::{self, DEFAULT_PRESET, GainsSource};
+use crate::catalogue::{self, GainsSource, default_preset};
 use crate::cli::{Context, ControllerName, Exit, TuneArgs};
 use crate::error::Error;
 use crate::output::{self, number, table};
 use crate::page::{self, Spread, percent_of_tail, spread};
 use crate::progress::{Terminal, achieved};
+use crate::promise;
 use crate::run::{Folder, Run, RunFile};
 use crate::sizes::for_joint_count;
 use crate::versions::versions;
@@ -58,8 +60,8 @@ struct Summary<'a> {
     files: Vec<String>,
     gains: Option<&'a Gains>,
     held_out: Compared,
-    /// What every statement is about.
-    about: Option<String>,
+    /// What the statements of each certificate are about.
+    about: Vec<String>,
     claims: Vec<ClaimSummary>,
     elapsed_s: f64,
 }
@@ -92,7 +94,6 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
     let (run, page, growth) = outcome?;
     let files = plan.folder.write(&run, &page)?;
     let certified = run.file.record.winner.is_some();
-    let claims = run.certificate.as_ref();
     if context.json {
         let HeldOut { start, tuned } = &run.file.record.held_out;
         output::print_json(&Summary {
@@ -101,8 +102,8 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
             files: files.iter().map(|path| path.display().to_string()).collect(),
             gains: run.file.record.tuned(),
             held_out: Compared { published: start.as_ref().map(spread), tuned: tuned.as_ref().map(spread) },
-            about: claims.map(|certificate| certificate.document().about.clone()),
-            claims: claims.map(|certificate| summaries(certificate, &growth)).unwrap_or_default(),
+            about: run.certificates.iter().map(|certificate| certificate.document().about.clone()).collect(),
+            claims: run.certificates.iter().zip(&growth).flat_map(|(one, growth)| summaries(one, growth)).collect(),
             elapsed_s: progress.elapsed_s(),
         })?;
     } else {
@@ -112,10 +113,6 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
 }
 
 fn plan(args: &TuneArgs) -> Result<Plan, Error> {
-    let controller = match args.controller {
-        None | Some(ControllerName::Aic) => "aic",
-        Some(ControllerName::Mrac) => return Err(Error::Mrac { command: "tune" }),
-    };
     let budget = args.budget.unwrap_or(DEFAULT_BUDGET);
     if budget == 0 {
         return Err(TuneError::from(SearchError::NoBudget).into());
@@ -124,10 +121,14 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     let scenario = catalogue::scenario(args.scenario.as_deref(), &robot)?;
     let family = family_of(&scenario.plant_box)?;
     let records = catalogue::records(&[])?;
-    let (space_name, space) = catalogue::space(args.space.as_deref())?;
-    let (preset, start) = start_of(&space)?;
-    // A start outside the space is refused before anything is computed.
-    space.admit(&start).map_err(|error| TuneError::from(SearchError::Start(error)))?;
+    let (space_name, file) = catalogue::space(args.space.as_deref(), args.controller)?;
+    let controller = file.controller();
+    let inertia_kg_m2 = inertia_kg_m2(&robot, &scenario)?;
+    let (preset, space, start) = started(&file, Some(&inertia_kg_m2))?;
+    let goals = Goals { objective: args.objective.unwrap_or(space.goals().objective), ..space.goals().clone() };
+    if let (Gains::Mrac(_), Some(goal)) = (&start, goals.from(Source::Proved).first()) {
+        return Err(Error::NoFigure { goal: *goal });
+    }
     let seed = args.seed.unwrap_or(DEFAULT_SEED);
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(run_name(&robot, controller, seed)));
     Ok(Plan {
@@ -136,7 +137,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
             robot_sha256: robot.sha256(),
             scenario: scenario.name.clone(),
             versions: versions(),
-            goals: Goals { objective: args.objective.unwrap_or(space.goals().objective), ..space.goals().clone() },
+            goals,
             search: SearchSettings::new(space.method(), budget, seed),
             batch_plants: args.plants.unwrap_or(DEFAULT_PLANTS),
             held_out_plants: HELD_OUT_PLANTS,
@@ -158,13 +159,24 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     })
 }
 
-/// Where a search of `space` begins: the name of the gains, and the gains.
-pub fn start_of(space: &Space) -> Result<(String, Gains), Error> {
-    let preset = space.start().unwrap_or(DEFAULT_PRESET).to_owned();
-    let source = GainsSource::find(&preset)?;
-    let start =
-        Gains::from_table(source.aic("tune")?).map_err(|source| Error::NotShared { gains: preset.clone(), source })?;
-    Ok((preset, start))
+/// Where a search begins: the name of the gains, the space, and the gains as the space writes them. A start outside the space is refused before anything is computed.
+pub fn started(file: &SpaceFile, inertia_kg_m2: Option<&[f64]>) -> Result<(String, Space, Gains), Error> {
+    let controller = if file.controller() == "mrac" { ControllerName::Mrac } else { ControllerName::Aic };
+    let preset = file.start().unwrap_or(default_preset(controller)).to_owned();
+    let published = GainsSource::find(&preset)?.gains.gains;
+    let space = file.on(Setting { start: Some(&published), inertia_kg_m2 })?;
+    let start = space.admit(&published)?;
+    Ok((preset, space, start))
+}
+
+/// The diagonal of the nominal arm's inertia matrix where the scenario starts.
+pub fn inertia_kg_m2(robot: &Robot, scenario: &Scenario) -> Result<Vec<f64>, Error> {
+    for_joint_count!(robot.joints(), N => {
+        let model = Model::<N>::new(robot).map_err(|source| Error::Robot { file: None, source })?;
+        let inertia = mass_matrix(&model, &Joints::from_fn(|joint, _| scenario.start_rad[joint]));
+        Ok((0..N).map(|joint| inertia[(joint, joint)]).collect())
+    })
+    .unwrap_or_else(|| Err(catalogue::too_many_joints(robot)))
 }
 
 /// `panda-aic-1`; a URDF may name its robot with anything, a folder may not.
@@ -175,7 +187,7 @@ fn run_name(robot: &Robot, controller: &str, seed: u64) -> String {
 }
 
 /// The run and its page.
-fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, String, Vec<Option<Growth>>), Error> {
+fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, String, Vec<Growths>), Error> {
     let Plan { robot, scenario, question, .. } = plan;
     let seed = question.search.seed;
     let misfit = |error| match error {
@@ -193,22 +205,20 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
         certifier.constants();
     }
     let objective =
-        AicObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
+        SimulatedObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
     let goals = objective.batch().resolved(question.goals.clone(), &plan.start);
     let objective = objective.with_goals(&goals, &certifier).hardest_first(&plan.start);
     let judge = judge.with_goals(&goals.for_comparison());
     let question = Question { goals, ..question.clone() };
     let bench = Bench { objective: &objective, judge: &judge, progress };
-    let mut first_refusal: Option<Certificate> = None;
+    let mut first_refusal: Option<Vec<Certificate>> = None;
     let mut failure: Option<StabilityError> = None;
-    let certify = |gains: &Gains| match certifier
-        .certify(&gains.on_every_joint(), &[ClaimKind::Exponential, ClaimKind::Region])
-    {
-        Ok(certificate) if certificate.all_hold() => Ok(certificate),
-        Ok(refusal) => {
-            let reason = why_not(&refusal);
+    let certify = |gains: &Gains| match promise::certify(&certifier, scenario, gains) {
+        Ok(certificates) if certificates.iter().all(Certificate::all_hold) => Ok(certificates),
+        Ok(refused) => {
+            let reason = refused.last().map(why_not).unwrap_or_default();
             progress.detail(|| format!("          {reason}"));
-            first_refusal.get_or_insert(refusal);
+            first_refusal.get_or_insert(refused);
             Err(reason)
         }
         Err(error) => {
@@ -222,18 +232,22 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
         return Err(error.into());
     }
     let file = RunFile {
-        controller: "aic".to_owned(),
+        controller: plan.start.controller().to_owned(),
         preset: plan.preset.clone(),
         space_name: plan.space_name.clone(),
         scenario: scenario.clone(),
         record,
     };
-    let run = Run { file, certificate: certificate.or(first_refusal) };
+    let run = Run { file, certificates: certificate.or(first_refusal).unwrap_or_default() };
     progress.begin("writing the report");
     let page = page::page::<N>(&run, robot, &plan.robot_argument, &plan.folder)?;
-    let growth = run.certificate.as_ref().map(|certificate| growths::<N>(robot, certificate)).transpose()?;
-    Ok((run, page, growth.unwrap_or_default()))
+    let growth = run.certificates.iter().map(|certificate| growths::<N>(robot, certificate));
+    let growth = growth.collect::<Result<_, _>>()?;
+    Ok((run, page, growth))
 }
+
+/// What the simulated refusals of a certificate show, claim by claim.
+type Growths = Vec<Option<Growth>>;
 
 /// The claims that do not hold, in a few words.
 fn why_not(refusal: &Certificate) -> String {
@@ -305,13 +319,24 @@ pub fn beyond_the_claims(scenario: &Scenario) -> Option<String> {
     })
 }
 
-fn in_words(plan: &Plan, run: &Run, growth: &[Option<Growth>], files: &[PathBuf], elapsed_s: f64) -> String {
+/// Under which law published gains were compared, where there are several.
+pub fn law_of_the_start(file: &RunFile) -> Option<String> {
+    let Gains::Mrac(table) = &file.record.start()?.gains else { return None };
+    Some(format!(
+        "Note: the gains of {} ran under the law of the search space, {}, which need not be the one that they were published with.",
+        file.preset,
+        MracLaw::from(table.law)
+    ))
+}
+
+fn in_words(plan: &Plan, run: &Run, growth: &[Growths], files: &[PathBuf], elapsed_s: f64) -> String {
     let record = &run.file.record;
     let question = &record.question;
     let objective = question.goals.objective;
     let mut text = format!(
-        "{} under the AIC in {}: {} candidates{}, {elapsed_s:.1} s\n\n",
+        "{} under the {} in {}: {} candidates{}, {elapsed_s:.1} s\n\n",
         question.robot,
+        run.file.controller.to_uppercase(),
         question.scenario,
         record.evaluations.len(),
         if question.goals.from(Source::Simulated).is_empty() {
@@ -354,31 +379,37 @@ fn in_words(plan: &Plan, run: &Run, growth: &[Option<Growth>], files: &[PathBuf]
         text.push_str(&output::wrapped(&kept, 0));
     }
     let _ = writeln!(text);
-    match (record.winner(), &run.certificate) {
-        (Some(_), Some(certificate)) => text.push_str(&claims_in_words(certificate, growth, false)),
-        (_, refusal) => {
+    let claims = run.certificates.iter().zip(growth).map(|(one, growth)| claims_in_words(one, growth, false));
+    let claims = claims.collect::<Vec<_>>().join("\n");
+    match record.winner() {
+        Some(_) => text.push_str(&claims),
+        None => {
             let reason = match record.certification.len() {
                 0 => nobody_came(record),
-                1 => "the candidate brought before the certifier does not hold both claims".to_owned(),
-                count => format!("none of the {count} candidates brought before the certifier holds both claims"),
+                1 => "the candidate brought before the certifier does not hold all claims".to_owned(),
+                count => format!("none of the {count} candidates brought before the certifier holds all claims"),
             };
             text.push_str(&output::wrapped(&format!("NOT CERTIFIED: {reason}; no gains.toml was written."), 0));
             text.push_str(
                 "  try: more friction, a smaller payload or gravity compensation in the scenario's plant box\n\n",
             );
-            if let Some(refusal) = refusal {
-                let _ = writeln!(text, "The best of them:");
-                text.push_str(&claims_in_words(refusal, growth, false));
+            if !claims.is_empty() {
+                let _ = writeln!(text, "The best of them:\n{claims}");
             }
         }
+    }
+    if let Some(note) = law_of_the_start(&run.file) {
+        text.push_str(&output::wrapped(&note, 0));
     }
     if let Some(note) = beyond_the_claims(&run.file.scenario) {
         text.push_str(&output::wrapped(&note, 0));
     }
     let names: Vec<_> = files.iter().filter_map(|path| path.file_name()).map(|name| name.to_string_lossy()).collect();
     let _ = writeln!(text, "\n{}: {}", plan.folder.path.display(), names.join(", "));
-    if run.certificate.is_some() {
-        let _ = writeln!(text, "check it: autotune verify {}", plan.folder.certificate().display());
+    if !run.certificates.is_empty() {
+        let paths = plan.folder.certificates(run.file.certificates());
+        let paths = paths.iter().take(run.certificates.len()).map(|path| path.display().to_string());
+        let _ = writeln!(text, "check it: autotune verify {}", paths.collect::<Vec<_>>().join(" "));
     }
     text
 }

@@ -1,38 +1,30 @@
-//! The certificate as the page shows it: claims with margins, the pole map, the radius against the moves.
+//! The certificates as the page shows them: claims with margins, the pole map, the radius against the moves.
 
+use std::path::PathBuf;
+
+use certune::closed_loop::Gains;
 use certune::dynamics::Robot;
-use certune::poles_per_s;
 use certune::report::{
     Assumption, CertificateRecord, Claim, GoalStep, Grade, Margin, Pair, Pole, PoleMap, RegionRecord, Verdict,
 };
-use certune::tune::Gains;
 use certune::verify::{self, Certificate, Checked};
+use certune::{StabilityError, poles_per_s};
 use num_traits::ToPrimitive;
 
 use super::runs::label;
 use crate::commands::claims::{growth_in_words, growths};
 use crate::error::Error;
-use crate::run::Run;
+use crate::run::{Folder, Run};
 
 /// Configurations, each with a plant, of the pole map.
 const CONFIGURATIONS: usize = 120;
 
 /// The evidence of a run.
 pub fn evidence<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Result<CertificateRecord, Error> {
-    let scenario = &run.file.scenario;
-    let seed = run.file.record.question.search.seed;
-    let poles = |gains: &Gains| -> Result<Vec<Pole>, Error> {
-        let poles = poles_per_s::<N>(robot, &scenario.plant_box, &gains.on_every_joint(), CONFIGURATIONS, seed)?;
-        Ok(poles.into_iter().map(|[re, im]| Pole { re, im }).collect())
-    };
-    let poles = Pair { published: poles(&gains.published)?, tuned: poles(&gains.tuned)? };
-    let slowest = poles.tuned.iter().map(|pole| pole.re).reduce(f64::max);
-    let Some(certificate) = &run.certificate else {
-        let pole_map = Some(PoleMap { configurations: CONFIGURATIONS as u64, poles, certified_rate_per_s: None });
-        return Ok(CertificateRecord { pole_map, ..CertificateRecord::default() });
-    };
-    let document = certificate.document();
-    let find = |value: fn(&verify::Claim) -> Option<f64>| document.claims.iter().find_map(|entry| value(&entry.claim));
+    let poles = poles::<N>(run, robot, gains)?;
+    let slowest = poles.iter().flat_map(|poles| &poles.tuned).map(|pole| pole.re).reduce(f64::max);
+    let claims = || run.certificates.iter().flat_map(|certificate| &certificate.document().claims);
+    let find = |value: fn(&verify::Claim) -> Option<f64>| claims().find_map(|entry| value(&entry.claim));
     let certified_rate_per_s = find(|claim| match claim {
         verify::Claim::Exponential(claim) => Some(claim.rate_per_s.to_f64()),
         _ => None,
@@ -41,21 +33,43 @@ pub fn evidence<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -
         verify::Claim::Region(claim) => Some(claim.radius_rad.to_f64()),
         _ => None,
     });
-    let growth = growths::<N>(robot, certificate)?;
-    let entries = document.claims.iter().zip(certificate.checked()).zip(growth);
-    let rows = entries.map(|((entry, checked), growth)| {
-        let mut row = claim_row(&entry.claim, checked, certificate, slowest);
-        row.counterexample.extend(growth.as_ref().map(growth_in_words));
-        row
-    });
-    let rows = rows.collect();
+    let mut rows = Vec::new();
+    for certificate in &run.certificates {
+        let entries = certificate.document().claims.iter().zip(certificate.checked());
+        for ((entry, checked), growth) in entries.zip(growths::<N>(robot, certificate)?) {
+            let mut row = claim_row(&entry.claim, checked, certificate, slowest);
+            row.counterexample.extend(growth.as_ref().map(growth_in_words));
+            rows.push(row);
+        }
+    }
+    let joined = |words: Vec<String>| words.join(", ");
+    let files = Folder { path: PathBuf::new() }.certificates(run.file.certificates());
+    let files = files.iter().take(run.certificates.len()).map(|path| path.display().to_string());
+    let hashes = run.certificates.iter().map(|certificate| certificate.document().sha256.clone());
+    let map = |poles| PoleMap { configurations: CONFIGURATIONS as u64, poles, certified_rate_per_s };
     Ok(CertificateRecord {
-        file_name: "certificate.json".to_owned(),
-        sha256: document.sha256.clone(),
+        file_name: joined(files.collect()),
+        sha256: joined(hashes.collect()),
         claims: rows,
-        pole_map: Some(PoleMap { configurations: CONFIGURATIONS as u64, poles, certified_rate_per_s }),
-        region: Some(RegionRecord { radius_rad, steps: steps(run) }),
+        pole_map: poles.map(map),
+        // The region's claim is about any goal; the adaptive controller's is about motions near one.
+        region: match gains.tuned {
+            Gains::Aic(_) if !run.certificates.is_empty() => Some(RegionRecord { radius_rad, steps: steps(run) }),
+            Gains::Aic(_) | Gains::Mrac(_) => None,
+        },
     })
+}
+
+/// The poles of an AIC's linearised loops. The adaptive controller's gains do not rest, so that its loop has none.
+fn poles<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Result<Option<Pair<Vec<Pole>>>, Error> {
+    let seed = run.file.record.question.search.seed;
+    let of = |gains: &Gains| -> Result<Option<Vec<Pole>>, Error> {
+        let Gains::Aic(table) = gains else { return Ok(None) };
+        let gains = table.bind().map_err(StabilityError::from)?;
+        let poles = poles_per_s::<N>(robot, &run.file.scenario.plant_box, &gains, CONFIGURATIONS, seed)?;
+        Ok(Some(poles.into_iter().map(|[re, im]| Pole { re, im }).collect()))
+    };
+    Ok(of(&gains.published)?.zip(of(&gains.tuned)?).map(|(published, tuned)| Pair { published, tuned }))
 }
 
 fn grade(grade: verify::Grade) -> Grade {

@@ -7,16 +7,17 @@ mod evidence;
 mod figures;
 mod runs;
 
-use certune::closed_loop::PlantBox;
+use certune::closed_loop::{Gains, PlantBox};
 use certune::dynamics::Robot;
 use certune::report::{
     Asked, CommandLine, CostMeaning, Evaluation, GainRow, Pair, RangeRow, SearchBounds, SearchRecord, SensitivityRow,
     TuningReport, Version, tuning_report,
 };
-use certune::tune::{Freedom, Gain, Gains, Goal, Goals, Outcome, Phase, RunRecord, Scale, Source};
+use certune::tune::{Goal, Goals, Outcome, Phase, RunRecord, Scale, Source};
 
 use crate::catalogue;
 use crate::error::Error;
+use crate::promise;
 use crate::run::{Folder, Run};
 
 pub use figures::{Spread, spread};
@@ -32,7 +33,7 @@ pub fn page<const N: usize>(run: &Run, robot: &Robot, robot_argument: &str, fold
     let certified = record.winner.is_some();
     let report = TuningReport {
         asked: asked(run, robot, robot_argument),
-        gains: gain_rows(record, &gains),
+        gains: gain_rows(record, robot, &gains),
         response: runs.response,
         segments: runs.segments,
         held_out: runs.held_out,
@@ -55,15 +56,11 @@ pub fn page<const N: usize>(run: &Run, robot: &Robot, robot_argument: &str, fold
 fn compared(run: &Run) -> Result<Pair<Gains>, Error> {
     let record = &run.file.record;
     let published = match record.start() {
-        Some(start) => start.gains,
-        None => {
-            let source = catalogue::GainsSource::find(catalogue::DEFAULT_PRESET)?;
-            Gains::from_table(source.aic("report")?)
-                .map_err(|source| Error::NotShared { gains: catalogue::DEFAULT_PRESET.to_owned(), source })?
-        }
+        Some(start) => start.gains.clone(),
+        None => catalogue::GainsSource::find(&run.file.preset)?.gains.gains,
     };
     let best = || record.evaluations.iter().min_by_key(|evaluation| (evaluation.outcome, evaluation.index));
-    let tuned = record.winner().or_else(best).map_or(published, |evaluation| evaluation.gains);
+    let tuned = record.winner().or_else(best).map_or_else(|| published.clone(), |found| found.gains.clone());
     Ok(Pair { published, tuned })
 }
 
@@ -133,10 +130,10 @@ fn command(run: &Run, robot_argument: &str) -> String {
     }
     if !catalogue::SPACES.iter().any(|(name, _)| *name == run.file.space_name) {
         command.push_str(&format!(" --space {}", quoted(&format!("{}.toml", run.file.space_name))));
+    } else if run.file.space_name != catalogue::SPACES[0].0 {
+        command.push_str(&format!(" --controller {}", run.file.controller));
     }
-    if question.goals.objective != Goal::default() {
-        command.push_str(&format!(" --objective {}", question.goals.objective));
-    }
+    command.push_str(&format!(" --objective {}", question.goals.objective));
     command.push_str(&format!(" --seed {} --budget {}", search.seed, search.evaluations));
     command
 }
@@ -169,31 +166,51 @@ fn plant_box_rows(plants: &PlantBox) -> Vec<RangeRow> {
     ]
 }
 
-fn gain_rows(record: &RunRecord, gains: &Pair<Gains>) -> Vec<GainRow> {
-    let unit = |gain: Gain| match gain {
-        Gain::KappaMu => "1/s",
-        Gain::KappaA => "N m/(rad s)",
-        Gain::SigmaQ | Gain::SigmaDq | Gain::SigmaMu | Gain::SigmaDmu => "",
-        Gain::ReferenceTimeConstantS => "s",
-    };
-    let row = |gain: Gain| {
-        let tuned = gains.tuned.get(gain);
-        let freedom = record.space.iter().find(|row| row.gain == gain).map(|row| row.freedom);
-        let bounds = match freedom {
-            Some(Freedom::Free(range)) => {
-                let place = match range.scale {
-                    Scale::Log => (tuned / range.lower).ln() / (range.upper / range.lower).ln(),
-                    Scale::Linear => (tuned - range.lower) / (range.upper - range.lower),
-                };
-                let on_bound = !(ON_BOUND..=1.0 - ON_BOUND).contains(&place);
-                Some(SearchBounds { lower: range.lower, upper: range.upper, on_bound })
+/// A row for each row of the gains file, or for each of its joints where they differ.
+fn gain_rows(record: &RunRecord, robot: &Robot, gains: &Pair<Gains>) -> Vec<GainRow> {
+    let rows = gains.published.rows().into_iter().zip(gains.tuned.rows());
+    rows.flat_map(|((name, published), (_, tuned))| {
+        let row = |joint: Option<usize>| {
+            let index = joint.unwrap_or(0);
+            let (published, tuned) = (published.of(index).unwrap_or(f64::NAN), tuned.of(index).unwrap_or(f64::NAN));
+            GainRow {
+                name: name.to_owned(),
+                joint: joint.and_then(|joint| robot.links().get(joint)).map(|link| link.joint_name.clone()),
+                unit: unit(name).to_owned(),
+                published,
+                tuned,
+                bounds: bounds(record, name, index, tuned),
             }
-            Some(Freedom::Fixed(_)) | None => None,
         };
-        let (name, unit) = (gain.key().to_owned(), unit(gain).to_owned());
-        GainRow { name, joint: None, unit, published: gains.published.get(gain), tuned, bounds }
+        if published.shared().is_some() && tuned.shared().is_some() {
+            vec![row(None)]
+        } else {
+            (0..robot.joints()).map(|joint| row(Some(joint))).collect()
+        }
+    })
+    .collect()
+}
+
+fn unit(row: &str) -> &'static str {
+    match row {
+        "kappa_mu" => "1/s",
+        "kappa_a" => "N m/(rad s)",
+        "omega_rad_per_s" => "rad/s",
+        "reference_time_constant_s" => "s",
+        _ => "",
+    }
+}
+
+/// The range of a number in the search; none for one that was fixed.
+fn bounds(record: &RunRecord, row: &str, joint: usize, tuned: f64) -> Option<SearchBounds> {
+    let unit = |knob: &certune::tune::Knob| knob.per_unit.get(row)?.of(joint).filter(|unit| *unit > 0.0);
+    let (range, unit) = record.space.knobs.iter().find_map(|knob| Some((knob.range, unit(knob)?)))?;
+    let (lower, upper) = (range.lower * unit, range.upper * unit);
+    let place = match range.scale {
+        Scale::Log => (tuned / lower).ln() / (upper / lower).ln(),
+        Scale::Linear => (tuned - lower) / (upper - lower),
     };
-    Gain::ALL.into_iter().map(row).collect()
+    Some(SearchBounds { lower, upper, on_bound: !(ON_BOUND..=1.0 - ON_BOUND).contains(&place) })
 }
 
 fn search(record: &RunRecord) -> SearchRecord {
@@ -245,7 +262,7 @@ fn sensitivity(record: &RunRecord) -> Vec<SensitivityRow> {
     let Some(cost) = record.winner().and_then(|winner| winner.outcome.cost()) else { return Vec::new() };
     let ratio = |outcome: Outcome| outcome.cost().map(|changed| changed / cost);
     let row = |row: &certune::tune::Sensitivity| SensitivityRow {
-        gain: row.gain.key().to_owned(),
+        gain: row.knob.clone(),
         ratio_at_minus_10_percent: ratio(row.at_minus_10_percent),
         ratio_at_plus_10_percent: ratio(row.at_plus_10_percent),
     };
@@ -256,10 +273,11 @@ fn recheck(run: &Run, robot_argument: &str, folder: &Folder, certified: bool) ->
     let line = |command: String, shows: &str| CommandLine { command, shows: shows.to_owned() };
     let file = |path: std::path::PathBuf| quoted(&path.to_string_lossy());
     let mut lines = Vec::new();
-    if run.certificate.is_some() {
+    if !run.certificates.is_empty() {
+        let paths = folder.certificates(run.file.certificates()).into_iter().take(run.certificates.len());
         lines.push(line(
-            format!("autotune verify {}", file(folder.certificate())),
-            "Reads the certificate alone, derives every matrix again and decides every inequality in exact arithmetic.",
+            format!("autotune verify {}", paths.map(file).collect::<Vec<_>>().join(" ")),
+            "Reads certificates alone, derives every matrix again and decides every inequality in exact arithmetic.",
         ));
     }
     let scenario = &run.file.scenario;
@@ -274,10 +292,16 @@ fn recheck(run: &Run, robot_argument: &str, folder: &Folder, certified: bool) ->
         let robot = quoted(robot_argument);
         let gains = file(folder.gains());
         if !scenario_argument.is_empty() {
-            lines.push(line(
-                format!("autotune certify --robot {robot} --gains {gains}{scenario_argument}"),
-                "Samples the arm's constants again and searches for the proofs again.",
-            ));
+            // Claims about the adaptive controller are about one goal each.
+            let goals = promise::goals(scenario).into_iter().take(run.file.certificates());
+            for goal in goals {
+                let at = goal.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
+                let at = if run.file.controller == "mrac" { format!(" --at={at}") } else { String::new() };
+                lines.push(line(
+                    format!("autotune certify --robot {robot} --gains {gains}{scenario_argument}{at}"),
+                    "Samples the arm's constants again and searches for the proofs again.",
+                ));
+            }
         }
         let plant = runs::middle(&scenario.plant_box);
         lines.push(line(
@@ -335,6 +359,7 @@ fn method(run: &Run, certified: bool) -> Vec<String> {
                 .to_owned(),
         );
     }
+    paragraphs.extend(crate::commands::tune::law_of_the_start(&run.file));
     paragraphs.extend(crate::commands::tune::beyond_the_claims(&run.file.scenario));
     paragraphs
 }

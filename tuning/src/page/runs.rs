@@ -1,13 +1,16 @@
 //! Runs that are simulated again for their curves: the nominal plant, and the held-out plants.
 
 use certune::closed_loop::{
-    Metrics, NoiseStream, Plant, PlantBox, PlantSetting, Sample, Segment, Task, Trajectory, aic_diagnostics, simulate,
+    Gains, Metrics, NoiseStream, Plant, PlantBox, PlantSetting, Row, Sample, Segment, Task, Trajectory, simulate,
 };
+use certune::control::Controller;
 use certune::control::aic::{Aic, AicParams, AicState};
+use certune::control::mrac::{Mrac, MracParams};
 use certune::dynamics::{Joints, Robot};
 use certune::report::{Bands, HeldOut, Pair, PlantRow, Response, SegmentMetrics, SegmentRow, Trajectory as Curves};
 use certune::tune::streams::FIRST_HELD_OUT_PLANT;
-use certune::tune::{Batch, Gains, PlantResult, Verdict};
+use certune::tune::{Batch, PlantResult, Verdict};
+use certune::{ArmGains, StabilityError};
 use rayon::prelude::*;
 
 use crate::error::Error;
@@ -50,13 +53,6 @@ pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Re
     let seed = question.search.seed;
     let goals = question.goals.for_comparison();
     let batch = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants)?.with_goals(&goals);
-    let task = batch.task();
-    let params = |gains: &Gains| {
-        AicParams::<N>::new(&gains.on_every_joint(), task.step_s)
-            .map_err(|source| Error::Gains { gains: "of the run".to_owned(), source })
-    };
-    let controllers = Pair { published: Aic::new(&params(&gains.published)?), tuned: Aic::new(&params(&gains.tuned)?) };
-
     let centre = middle(&scenario.plant_box);
     let setting = PlantSetting::nominal(robot, scenario.plant_box.gravity_compensation)
         .with_payload(centre.payload_kg)
@@ -64,11 +60,11 @@ pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Re
         .with_rotor_inertia(centre.rotor_inertia_kg_m2);
     let nominal = Plant::<N>::new(robot, &setting)?;
     let noise = NoiseStream { seed, index: 0 };
-    let (published, published_metrics) = curves(&nominal, task, &controllers.published, noise);
-    let (tuned, tuned_metrics) = curves(&nominal, task, &controllers.tuned, noise);
-
-    let (published_bands, published_costs) = held_out(&batch, &controllers.published);
-    let (tuned_bands, tuned_costs) = held_out(&batch, &controllers.tuned);
+    let course = |gains: &Gains| course(gains, &nominal, noise, &batch);
+    let Course { curves: published, metrics: published_metrics, bands: published_bands, costs: published_costs } =
+        course(&gains.published)?;
+    let Course { curves: tuned, metrics: tuned_metrics, bands: tuned_bands, costs: tuned_costs } =
+        course(&gains.tuned)?;
     let published_costs = recorded(record.held_out.start.as_ref()).unwrap_or(published_costs);
     let tuned_costs = recorded(record.held_out.tuned.as_ref()).unwrap_or(tuned_costs);
     let plants = batch.plants().iter().zip(published_costs.into_iter().zip(tuned_costs));
@@ -103,11 +99,50 @@ fn recorded(verdict: Option<&Verdict>) -> Option<Vec<Option<f64>>> {
     verdict.map(|verdict| verdict.plants.iter().map(cost).collect())
 }
 
-fn curves<const N: usize>(plant: &Plant<N>, task: &Task<N>, aic: &Aic<N>, noise: NoiseStream) -> (Curves, Metrics) {
-    let mut recorder = Trajectory::new(CURVE_EVERY, aic_diagnostics(aic));
-    let metrics = simulate(plant, task, aic, noise, &mut recorder);
+/// What one set of gains does.
+struct Course {
+    curves: Curves,
+    metrics: Metrics,
+    bands: Bands,
+    costs: Vec<Option<f64>>,
+}
+
+fn course<const N: usize>(
+    gains: &Gains,
+    nominal: &Plant<N>,
+    noise: NoiseStream,
+    batch: &Batch<N>,
+) -> Result<Course, Error> {
+    let task = batch.task();
+    let bad = |source| Error::Gains { gains: "of the run".to_owned(), source };
+    let ((curves, metrics), (bands, costs)) = match ArmGains::<N>::bind(gains).map_err(StabilityError::from)? {
+        ArmGains::Aic(gains) => {
+            let aic = Aic::new(&AicParams::new(&gains, task.step_s).map_err(bad)?);
+            let free_energy = |sample: &Sample<'_, N, AicState<N>>| {
+                Some(aic.free_energy(sample.state, &sample.measurement, &sample.goal))
+            };
+            (curves(nominal, task, &aic, noise, free_energy), held_out(batch, &aic))
+        }
+        ArmGains::Mrac(gains) => {
+            let mrac = Mrac::new(&MracParams::new(&gains, task.step_s).map_err(bad)?);
+            (curves(nominal, task, &mrac, noise, |_| None), held_out(batch, &mrac))
+        }
+    };
+    Ok(Course { curves, metrics, bands, costs })
+}
+
+/// The nominal run; `free_energy` is read off the controllers that have one.
+fn curves<const N: usize, C: Controller<N>>(
+    plant: &Plant<N>,
+    task: &Task<N>,
+    controller: &C,
+    noise: NoiseStream,
+    free_energy: impl Fn(&Sample<'_, N, C::State>) -> Option<f64>,
+) -> (Curves, Metrics) {
+    let mut recorder = Trajectory::new(CURVE_EVERY, free_energy);
+    let metrics = simulate(plant, task, controller, noise, &mut recorder);
     let rows = recorder.into_rows();
-    let series = |value: fn(&certune::closed_loop::Row<N, certune::closed_loop::AicDiagnostics<N>>) -> &Joints<N>| {
+    let series = |value: fn(&Row<N, Option<f64>>) -> &Joints<N>| {
         (0..N).map(|joint| rows.iter().map(|row| value(row)[joint]).collect()).collect()
     };
     let curves = Curves {
@@ -115,7 +150,7 @@ fn curves<const N: usize>(plant: &Plant<N>, task: &Task<N>, aic: &Aic<N>, noise:
         q_rad: series(|row| &row.q),
         goal_rad: series(|row| &row.goal),
         tau_n_m: series(|row| &row.tau),
-        free_energy: rows.iter().map(|row| row.diagnostics.free_energy).collect(),
+        free_energy: rows.iter().filter_map(|row| row.diagnostics).collect(),
         diverged_at_s: metrics.diverged_at_s,
     };
     (curves, metrics)
@@ -152,11 +187,11 @@ fn figures(segment: &Segment) -> SegmentMetrics {
 }
 
 /// Bands of the position error over the plants, and each plant's cost.
-fn held_out<const N: usize>(batch: &Batch<N>, aic: &Aic<N>) -> (Bands, Vec<Option<f64>>) {
+fn held_out<const N: usize, C: Controller<N> + Sync>(batch: &Batch<N>, controller: &C) -> (Bands, Vec<Option<f64>>) {
     let task = batch.task();
     let one = |(index, plant): &(u64, Plant<N>)| {
-        let mut recorder = Trajectory::new(BAND_EVERY, |_: &Sample<'_, N, AicState<N>>| ());
-        let metrics = simulate(plant, task, aic, batch.noise(*index), &mut recorder);
+        let mut recorder = Trajectory::new(BAND_EVERY, |_: &Sample<'_, N, C::State>| ());
+        let metrics = simulate(plant, task, controller, batch.noise(*index), &mut recorder);
         let errors: Vec<f64> = recorder.rows().iter().map(|row| (row.q - row.goal).norm()).collect();
         (errors, batch.scoring().of_run(&metrics).cost())
     };

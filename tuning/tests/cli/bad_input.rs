@@ -99,7 +99,9 @@ const CASES: &[(&str, i32, &[&str])] = &[
     ("--robot panda --plants 0", 1, &["at least 1 plant"]),
     ("--robot panda --plants few", 1, &["few", "--plants"]),
     ("--robot panda --controller pid", 1, &["pid", "aic"]),
-    ("--robot panda --controller mrac", 1, &["mrac", "simulate"]),
+    ("--robot panda --controller mrac --space panda-aic", 1, &["--controller mrac", "holds gains for `aic`"]),
+    ("--robot panda --controller mrac --objective certified-rate", 1, &["certified-rate", "settling-cost"]),
+    ("ask-tell --space panda-mrac", 1, &["panda-mrac", "gains.alpha1", "name the robot"]),
     ("verify", 1, &["CERTIFICATE.json"]),
     ("certify --robot panda", 1, &["--gains"]),
     (

@@ -79,14 +79,49 @@ fn a_search_for_the_largest_radius_ends_with_a_certificate_that_has_it() {
         // Better than the published gains, and exactly what the certificate says.
         assert!(cost(winner) < cost(0), "{objective}: {} against {}", cost(winner), cost(0));
         assert!((cost(winner) * figure(&made, claim, name) - 1.0).abs() < 1e-12);
-        for row in record["space"].as_array().unwrap() {
-            let found = evaluations[winner as usize]["gains"][row["gain"].as_str().unwrap()].as_f64().unwrap();
-            let end = |key: &str| row["freedom"][key].as_f64();
-            assert!(end("lower").is_none_or(|lower| lower <= found) && end("upper").is_none_or(|upper| found <= upper));
+        for knob in record["space"]["knobs"].as_array().unwrap() {
+            let found = evaluations[winner as usize]["gains"][knob["name"].as_str().unwrap()].as_f64().unwrap();
+            let end = |key: &str| knob[key].as_f64().unwrap();
+            assert!(end("lower") <= found && found <= end("upper"));
         }
         stdout(folder.path(), &format!("verify {objective}/certificate.json"), 0);
         assert!(read(folder.path().join(objective).join("report.html")).contains("The search was after the largest"));
     }
+}
+
+/// The adaptive controller's claims are about one goal each, so there is a certificate for every goal of the scenario, and the files of an earlier run go.
+#[test]
+fn mrac_is_tuned_and_certified_at_every_goal() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join("out").join(name);
+    std::fs::write(folder.path().join("short.toml"), SHORT).unwrap();
+    std::fs::create_dir(folder.path().join("out")).unwrap();
+    std::fs::write(at("certificate.json"), "of an earlier run").unwrap();
+    std::fs::write(at("certificate-3.json"), "of an earlier run").unwrap();
+    std::fs::write(at("certificate-mine.json"), "mine").unwrap();
+    let line = "--robot panda --controller mrac --scenario short.toml --budget 60 --plants 4 --seed 3 --out out";
+    let run = json(folder.path(), line, 0);
+    let expected =
+        ["certificate-1.json", "certificate-2.json", "certificate-mine.json", "gains.toml", "report.html", "run.json"];
+    assert_eq!(names(&folder.path().join("out")), expected);
+    let cost = |side: &str| run["held_out"][side]["cost_s"].as_f64().unwrap();
+    assert!(cost("tuned") < 0.7 * cost("published"), "{} against {}", cost("tuned"), cost("published"));
+    let claims = run["claims"].as_array().unwrap();
+    assert_eq!(claims.len(), 6);
+    assert!(claims.iter().all(|claim| claim["verdict"] == "holds" && claim["grade"] == "proved"));
+    assert_eq!(run["gains"]["law"], "reference-model");
+
+    stdout(folder.path(), "verify out/certificate-1.json out/certificate-2.json", 0);
+    let simulate = "simulate --robot panda --gains out/gains.toml --scenario short.toml";
+    assert!(json(folder.path(), simulate, 0)["diverged_at_s"].is_null());
+    let page = read(at("report.html"));
+    std::fs::remove_file(at("report.html")).unwrap();
+    stdout(folder.path(), "report out", 0);
+    assert!(read(at("report.html")) == page, "`report` makes another page than `tune`");
+    assert!(!page.contains("Pole map") && page.contains("certificate-2.json"));
+    // A winner without one of its certificates is no winner.
+    std::fs::remove_file(at("certificate-2.json")).unwrap();
+    stdout(folder.path(), "report out", 1);
 }
 
 /// A folder with an earlier run's gains and a file of the user's; a run in it that certifies nothing.

@@ -1,6 +1,7 @@
 //! Gains of either controller for an arm of `N` joints, and as a certificate writes them.
 
 use certune_certify::{AicGainValues, MracGainValues, ProblemError};
+use certune_closed_loop::{Gains as GainsTable, KeyError};
 use certune_control::aic::AicGains;
 use certune_control::mrac::{MracGains, MracLaw};
 use certune_verify::{Gains, MracLaw as WrittenLaw};
@@ -27,8 +28,19 @@ impl<const N: usize> From<MracGains<N>> for ArmGains<N> {
 }
 
 impl<const N: usize> ArmGains<N> {
+    /// The gains of a file's table on an arm.
+    ///
+    /// # Errors
+    /// [`KeyError`] when a list has another length than `N`.
+    pub fn bind(table: &GainsTable) -> Result<Self, KeyError> {
+        Ok(match table {
+            GainsTable::Aic(table) => table.bind()?.into(),
+            GainsTable::Mrac(table) => table.bind()?.into(),
+        })
+    }
+
     /// Whether every joint has the same gains, to the bit.
-    pub(super) fn are_shared(&self) -> bool {
+    pub fn are_shared(&self) -> bool {
         let same = |list: &[f64; N]| list.windows(2).all(|pair| pair[0].to_bits() == pair[1].to_bits());
         match self {
             Self::Aic(gains) => aic_lists(gains).into_iter().all(same),

@@ -23,7 +23,7 @@ mod request;
 
 use certune_bounds::{BoundsError, RecordError};
 use certune_certify::{CertifyError, FamilyValues, ProblemError, to_json};
-use certune_closed_loop::{PlantBox, PlantError};
+use certune_closed_loop::{KeyError, PlantBox, PlantError};
 use certune_control::ParamError;
 use certune_dynamics::RobotError;
 use certune_linsys::LoopError;
@@ -75,6 +75,9 @@ pub enum StabilityError {
     /// A plant of the family cannot be built.
     #[error(transparent)]
     Plant(#[from] PlantError),
+    /// A list of gains has another length than the arm.
+    #[error(transparent)]
+    Length(#[from] KeyError),
     /// The gains are no gains.
     #[error(transparent)]
     Gains(#[from] ParamError),

@@ -2,7 +2,8 @@
 //!
 //! The figure is the checked one: slack that a solver leaves in its answer is worth nothing here.
 
-use certune_tune::{Gains, Goal, Prover};
+use certune_closed_loop::Gains;
+use certune_tune::{Goal, Prover};
 use certune_verify::{Certificate, ClaimKind, Verdict};
 
 use super::arm::ArmCertifier;
@@ -24,12 +25,14 @@ fn figure(certificate: &Certificate, (claim, name): (ClaimKind, &'static str)) -
     figures.find(|figure| figure.name == name).map(|figure| figure.value.to_f64())
 }
 
+/// Figures of the active inference controller; the adaptive one has neither.
 impl<const N: usize> Prover for ArmCertifier<N> {
     fn figures(&self, gains: &Gains, goals: &[Goal]) -> Option<Vec<f64>> {
         let claims: Vec<(ClaimKind, &'static str)> = goals.iter().map(|goal| claim_of(*goal)).collect::<Option<_>>()?;
         let mut kinds: Vec<ClaimKind> = claims.iter().map(|(kind, _)| *kind).collect();
         kinds.dedup();
-        let certificate = self.certify(&gains.on_every_joint(), &kinds).ok()?;
+        let Gains::Aic(table) = gains else { return None };
+        let certificate = self.certify(&table.bind().ok()?, &kinds).ok()?;
         claims.into_iter().map(|claim| figure(&certificate, claim)).collect()
     }
 }

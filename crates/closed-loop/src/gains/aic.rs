@@ -66,6 +66,34 @@ impl AicTable {
             ("reference_time_constant_s", &self.reference_time_constant_s),
         ]
     }
+
+    /// The row of that key.
+    pub(super) fn row_mut(&mut self, key: &str) -> Option<&mut PerJoint> {
+        Some(match key {
+            "kappa_mu" => &mut self.kappa_mu,
+            "kappa_a" => &mut self.kappa_a,
+            "sigma_q" => &mut self.sigma_q,
+            "sigma_dq" => &mut self.sigma_dq,
+            "sigma_mu" => &mut self.sigma_mu,
+            "sigma_dmu" => &mut self.sigma_dmu,
+            "reference_time_constant_s" => &mut self.reference_time_constant_s,
+            _ => return None,
+        })
+    }
+
+    /// The table with the same number in every row.
+    pub fn uniform(value: f64) -> Self {
+        let row = || PerJoint::Shared(value);
+        Self {
+            kappa_mu: row(),
+            kappa_a: row(),
+            sigma_q: row(),
+            sigma_dq: row(),
+            sigma_mu: row(),
+            sigma_dmu: row(),
+            reference_time_constant_s: row(),
+        }
+    }
 }
 
 impl<const N: usize> From<&AicGains<N>> for AicTable {

@@ -155,6 +155,59 @@ impl MracTable {
             ("f13", &self.f13),
         ]
     }
+
+    /// The row of that key.
+    pub(super) fn row_mut(&mut self, key: &str) -> Option<&mut PerJoint> {
+        Some(match key {
+            "omega_rad_per_s" => &mut self.omega_rad_per_s,
+            "zeta" => &mut self.zeta,
+            "l1" => &mut self.l1,
+            "l2" => &mut self.l2,
+            "alpha1" => &mut self.alpha1,
+            "alpha2" => &mut self.alpha2,
+            "alpha3" => &mut self.alpha3,
+            "e01" => &mut self.e01,
+            "e02" => &mut self.e02,
+            "e03" => &mut self.e03,
+            "e11" => &mut self.e11,
+            "e12" => &mut self.e12,
+            "e13" => &mut self.e13,
+            "f01" => &mut self.f01,
+            "f02" => &mut self.f02,
+            "f03" => &mut self.f03,
+            "f11" => &mut self.f11,
+            "f12" => &mut self.f12,
+            "f13" => &mut self.f13,
+            _ => return None,
+        })
+    }
+
+    /// The table with the same number in every row.
+    pub fn uniform(law: LawName, value: f64) -> Self {
+        let row = || PerJoint::Shared(value);
+        Self {
+            law,
+            omega_rad_per_s: row(),
+            zeta: row(),
+            l1: row(),
+            l2: row(),
+            alpha1: row(),
+            alpha2: row(),
+            alpha3: row(),
+            e01: row(),
+            e02: row(),
+            e03: row(),
+            e11: row(),
+            e12: row(),
+            e13: row(),
+            f01: row(),
+            f02: row(),
+            f03: row(),
+            f11: row(),
+            f12: row(),
+            f13: row(),
+        }
+    }
 }
 
 impl<const N: usize> From<&MracGains<N>> for MracTable {

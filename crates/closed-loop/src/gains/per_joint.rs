@@ -40,6 +40,14 @@ impl PerJoint {
         rest.iter().all(|value| value.to_bits() == first.to_bits()).then_some(*first)
     }
 
+    /// The number of a joint, counted from 0; none beyond the end of a list.
+    pub fn of(&self, joint: usize) -> Option<f64> {
+        match self {
+            Self::Shared(value) => Some(*value),
+            Self::Each(values) => values.get(joint).copied(),
+        }
+    }
+
     /// Every number as the shortest decimal that reads back as the same `f64`; see the module's text.
     pub fn decimals(&self) -> Vec<String> {
         self.values().iter().copied().map(decimal).collect()

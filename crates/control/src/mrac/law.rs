@@ -3,7 +3,7 @@
 //! An adaptive gain is a sum of outer products with the signal that it multiplies, and `(a bᵀ) s = a (b . s)`: the step needs of the present and the last sample
 //! two scalar products a signal, and passes once over each integral, which it reads and then adds to. [`Mrac::adaptive_gains`] writes the gains out.
 
-use certune_linsys::{JointMatrix, Joints, Real};
+use certune_linsys::{JointMatrix, Joints, Lanes, Real};
 
 use super::params::{MracLaw, MracParams};
 use crate::controller::{Controller, Measurement};
@@ -144,9 +144,7 @@ impl<const N: usize, T: Real> Mrac<N, T> {
             e1: splat3(&gains.e1),
             f0: splat3(&gains.f0),
             f1: splat3(&gains.f1),
-            derivatives: [&gains.alpha, &gains.e0, &gains.e1, &gains.f0, &gains.f1]
-                .iter()
-                .any(|family| family[2].iter().any(|gain| *gain > 0.0)),
+            derivatives: params.has_derivatives(),
         }
     }
 
@@ -278,6 +276,34 @@ impl<const N: usize, T: Real> Mrac<N, T> {
             let ddq_ref = pull - self.two_zeta_omega[i] * state.dq_ref[i];
             state.dq_ref[i] += ddq_ref * self.step_s;
             state.q_ref[i] += state.dq_ref[i] * self.step_s;
+        }
+    }
+}
+
+impl<const N: usize, T: Lanes> Mrac<N, T> {
+    /// Controllers side by side: the parameters of each lane. All follow the law of the first.
+    pub fn pack<'a>(of: impl Fn(usize) -> &'a MracParams<N>) -> Self {
+        let first = Mrac::<N>::new(of(0));
+        let lanes = |get: &dyn Fn(&Mrac<N>) -> f64| T::from_lanes(|lane| get(&Mrac::new(of(lane))));
+        let joints = |get: &dyn Fn(&Mrac<N>) -> Joints<N>| {
+            Joints::from_fn(|joint, _| lanes(&|controller| get(controller)[joint]))
+        };
+        let rows = |get: fn(&Mrac<N>) -> &[Joints<N>; 3]| core::array::from_fn(|row| joints(&|c| get(c)[row]));
+        Self {
+            law: first.law,
+            step_s: lanes(&|c| c.step_s),
+            samples_per_s: lanes(&|c| c.samples_per_s),
+            product_step: lanes(&|c| c.product_step),
+            p2: joints(&|c| c.p2),
+            p3: joints(&|c| c.p3),
+            omega_squared: joints(&|c| c.omega_squared),
+            two_zeta_omega: joints(&|c| c.two_zeta_omega),
+            alpha: rows(|c| &c.alpha),
+            e0: rows(|c| &c.e0),
+            e1: rows(|c| &c.e1),
+            f0: rows(|c| &c.f0),
+            f1: rows(|c| &c.f1),
+            derivatives: (0..T::LANES).any(|lane| of(lane).has_derivatives()),
         }
     }
 }

@@ -121,6 +121,11 @@ impl<const N: usize> MracParams<N> {
         self.step_s
     }
 
+    /// Whether any derivative gain is above zero.
+    pub fn has_derivatives(&self) -> bool {
+        self.gains.families().iter().any(|(_, [_, _, derivative])| derivative.iter().any(|gain| *gain > 0.0))
+    }
+
     /// P₂ and P₃ of each joint.
     pub fn error_weights(&self) -> &[ErrorWeights; N] {
         &self.weights

@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use argmin::core::{CostFunction, Error, SendAlias, SyncAlias};
+use certune_closed_loop::Gains;
 
 use super::{Candidate, Evaluation, Objective, Phase, Progress, SearchSettings};
-use crate::gains::Gains;
 use crate::outcome::{Finite, Outcome};
 use crate::space::Space;
 
@@ -15,10 +15,17 @@ use crate::space::Space;
 #[error("every evaluation of the budget is used")]
 pub(super) struct BudgetSpent;
 
+/// The bits of every number, row by row: the identity of a candidate.
+type Bits = Vec<Vec<u64>>;
+
+fn bits(gains: &Gains) -> Bits {
+    gains.rows().into_iter().map(|(_, numbers)| numbers.values().iter().map(|x| x.to_bits()).collect()).collect()
+}
+
 struct Book {
     evaluations: Vec<Evaluation>,
     /// Index of the evaluation of a candidate.
-    known: HashMap<[u64; 7], usize>,
+    known: HashMap<Bits, usize>,
     best: usize,
     phase: Phase,
     /// Best and worst outcome of the last generation.
@@ -101,7 +108,7 @@ impl<'a> Ledger<'a> {
 
     pub(super) fn best(&self) -> Option<Gains> {
         let book = self.book();
-        book.evaluations.get(book.best).map(|evaluation| evaluation.gains)
+        book.evaluations.get(book.best).map(|evaluation| evaluation.gains.clone())
     }
 
     pub(super) fn into_evaluations(self) -> Vec<Evaluation> {
@@ -109,8 +116,8 @@ impl<'a> Ledger<'a> {
     }
 
     /// Evaluates the start exactly as it was given, unrounded.
-    pub(super) fn evaluate_start(&self, start: Gains) -> Result<(), BudgetSpent> {
-        self.evaluate(&[start], |_| None).map(|_| ())
+    pub(super) fn evaluate_start(&self, start: &Gains) -> Result<(), BudgetSpent> {
+        self.evaluate(std::slice::from_ref(start), |_| None).map(|_| ())
     }
 
     /// The outcomes at `points`, evaluated in parallel and recorded in order. A point whose gains are known costs nothing.
@@ -136,12 +143,12 @@ impl<'a> Ledger<'a> {
             let book = self.book();
             let mut left = self.budget - book.evaluations.len();
             for (place, gains) in candidates.iter().enumerate() {
-                let (bits, enough) = (gains.bits(), enough(place));
-                if let Some(task) = tasks.iter_mut().find(|task| task.candidate.gains.bits() == bits) {
+                let (own, enough) = (bits(gains), enough(place));
+                if let Some(task) = tasks.iter_mut().find(|task| bits(&task.candidate.gains) == own) {
                     task.candidate.enough = task.candidate.enough.zip(enough).map(|(a, b)| a.max(b));
                     continue;
                 }
-                let known = book.known.get(&bits).copied();
+                let known = book.known.get(&own).copied();
                 let settled = known.is_some_and(|index| match book.evaluations[index].outcome {
                     Outcome::Stopped { cost_above } => enough.is_some_and(|enough| enough <= cost_above),
                     _ => true,
@@ -150,10 +157,10 @@ impl<'a> Ledger<'a> {
                     continue;
                 }
                 left -= usize::from(known.is_none());
-                tasks.push(Task { candidate: Candidate { gains: *gains, enough }, known });
+                tasks.push(Task { candidate: Candidate { gains: gains.clone(), enough }, known });
             }
         }
-        let asked: Vec<Candidate> = tasks.iter().map(|task| task.candidate).collect();
+        let asked: Vec<Candidate> = tasks.iter().map(|task| task.candidate.clone()).collect();
         let Some(outcomes) = self.objective.evaluate_all(&asked) else {
             self.book().interrupted = true;
             return Err(BudgetSpent);
@@ -162,22 +169,22 @@ impl<'a> Ledger<'a> {
         let mut book = self.book();
         for (Task { candidate: Candidate { gains, .. }, known }, outcome) in tasks.into_iter().zip(outcomes) {
             let index = known.unwrap_or(book.evaluations.len());
-            let evaluation = Evaluation { index, phase: book.phase, gains, outcome };
             if known.is_some() {
                 book.evaluations[index].outcome = outcome;
             } else {
-                book.evaluations.push(evaluation);
-                book.known.insert(gains.bits(), index);
+                book.known.insert(bits(&gains), index);
+                let phase = book.phase;
+                book.evaluations.push(Evaluation { index, phase, gains, outcome });
             }
             if outcome < book.evaluations[book.best].outcome {
                 book.best = index;
             }
             if known.is_none() {
-                self.progress.evaluated(index + 1, self.budget, &evaluation, &book.evaluations[book.best]);
+                self.progress.evaluated(index + 1, self.budget, &book.evaluations[index], &book.evaluations[book.best]);
             }
         }
         let outcome = |gains: &Gains| {
-            let index = book.known.get(&gains.bits()).ok_or(BudgetSpent)?;
+            let index = book.known.get(&bits(gains)).ok_or(BudgetSpent)?;
             Ok(book.evaluations[*index].outcome)
         };
         let outcomes: Vec<Outcome> = candidates.iter().map(outcome).collect::<Result<_, _>>()?;

@@ -24,12 +24,12 @@ mod schedule;
 mod simplex;
 mod swarm;
 
+use certune_closed_loop::Gains;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 pub use simplex::SPREAD;
 
-use crate::gains::Gains;
 use crate::outcome::{Finite, Outcome};
 use crate::space::{Method, Space, SpaceError};
 use ledger::Ledger;
@@ -49,7 +49,7 @@ pub trait Objective: Sync {
 }
 
 /// What a search wants to know.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
     /// The gains.
     pub gains: Gains,
@@ -99,7 +99,7 @@ pub enum Phase {
 }
 
 /// One candidate and what became of it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Evaluation {
     /// Its place in the order of the search, from 0.
@@ -201,7 +201,7 @@ impl SearchRun {
 
 /// Searches `space` for the gains with the best outcome.
 ///
-/// `start` is written with the space's `sigma_q` first ([`Space::admit`]) and is evaluation 0 if given. Costs at most `settings.evaluations` calls
+/// `start` is written as the space writes it first ([`Space::admit`]) and is evaluation 0 if given. Costs at most `settings.evaluations` calls
 /// of the objective; runs on the current rayon pool.
 ///
 /// # Errors
@@ -224,10 +224,10 @@ pub fn search(
     }
     let start = start.map(|gains| space.admit(gains)).transpose()?;
     let ledger = Ledger::new(space, objective, progress, settings);
-    let termination = match start.map_or(Ok(()), |gains| ledger.evaluate_start(gains)) {
+    let termination = match start.as_ref().map_or(Ok(()), |gains| ledger.evaluate_start(gains)) {
         Err(ledger::BudgetSpent) => Termination::BudgetSpent,
         Ok(()) => {
-            let start = start.map(|gains| space.encode(&gains));
+            let start = start.as_ref().map(|gains| space.encode(gains));
             let centre = start.clone().unwrap_or_else(|| vec![0.5; space.dimension()]);
             let ended = match settings.method {
                 Method::Schedule => schedule::schedule(&ledger, start.as_deref(), settings),

@@ -1,21 +1,29 @@
-//! The search space: which gains move, between which bounds, on which scale, and where the search starts.
+//! The search space: what moves which gains, between which bounds, on which scale, and where the search starts.
 //!
-//! A point is a vector `x` of one coordinate per free gain, each in `[0, 1]`. With bounds `lo < hi` a coordinate means
+//! A point is a vector `x` of one coordinate per *knob*, each in `[0, 1]`. With bounds `lo < hi` a coordinate means
 //!
 //! ```text
-//! gain = exp(ln lo + x (ln hi - ln lo))     scale = "log"
-//! gain = lo + x (hi - lo)                   scale = "linear"
+//! value = exp(ln lo + x (ln hi - ln lo))     scale = "log"
+//! value = lo + x (hi - lo)                   scale = "linear"
 //! ```
 //!
-//! rounded to five significant decimal digits, so that the number that is simulated is the decimal number that is written to the gains file and
+//! and a knob sets numbers of the gains' table, its rows by its joints, from its value:
+//!
+//! ```text
+//! tie = "shared"     number = value                                      every joint the same; the default
+//! tie = "start"      number = value x what the start has there           the start's pattern over rows and joints stays
+//! tie = "inertia"    number = value x M_jj of its joint, kg m²           M at the scenario's start, nominal arm
+//! ```
+//!
+//! Values and numbers are rounded to five significant decimal digits, so that the number that is simulated is the decimal number that is written to the gains file and
 //! proved by the certificate. A solver may ask for any real `x`: it is folded back into `[0, 1]` as between two mirrors, which keeps the
 //! objective continuous and, unlike clamping, leaves no direction in which it is flat.
 //!
-//! The file is TOML:
+//! The file is TOML. A knob moves the row of its name on all joints unless `rows` or `joints` (counted from 1) say otherwise:
 //!
 //! ```toml
 //! schema = 1
-//! controller = "aic"
+//! controller = "aic"                  # or "mrac", with its law = "reference-model"
 //!
 //! [search]
 //! method = "schedule"                 # or "cma-es", "nelder-mead", "particle-swarm"
@@ -26,156 +34,65 @@
 //! [limits]                            # optional, see `goals`
 //! overshoot = 0.02
 //!
-//! [fixed]
+//! [fixed]                             # a number for all joints, or a list of one for each
 //! sigma_q = 1.0
+//! sigma_dq = 1.0
 //! reference_time_constant_s = 1.0
-//! sigma_mu = 5.0
-//! sigma_dmu = 10.0
 //!
 //! [gains.kappa_mu]
 //! lower = 2.0
 //! upper = 60.0
 //! scale = "log"
 //!
-//! [gains.kappa_a]
+//! [gains.sigmas]                      # one factor for two rows
+//! rows = ["sigma_mu", "sigma_dmu"]
+//! tie = "start"
+//! lower = 0.1
+//! upper = 10.0
+//! scale = "log"
+//!
+//! [gains.arm]                         # one row, a knob for some joints each
+//! rows = ["kappa_a"]
+//! joints = [1, 2, 3, 4]
+//! tie = "inertia"
 //! lower = 50.0
 //! upper = 20000.0
 //! scale = "log"
 //!
-//! [gains.sigma_dq]
-//! lower = 0.2
-//! upper = 5.0
+//! [gains.wrist]
+//! rows = ["kappa_a"]
+//! joints = [5, 6, 7]
+//! lower = 5.0
+//! upper = 2000.0
 //! scale = "log"
 //! ```
 //!
 //! Objective and limits are explained in [`goals`](crate::goals).
 //!
-//! Every gain is either fixed or free, never both, never neither. The kappas and sigmas have one redundant direction ([`Gains::rescaled`]), so at
-//! least one of them must be fixed.
+//! Every number of every row is either fixed or moved by exactly one knob. Multiplying the AIC's kappas and sigmas by one number, or the MRAC's l₁ and l₂ by one and its gains by the
+//! inverse, changes nothing ([`Space::written`]), so at least one of those rows must be fixed.
+//!
+//! A start must lie in the space, but for two liberties: it takes the space's law, and numbers tied to the inertia may have any pattern there. They are evaluated as they are, and
+//! the search goes on from the nearest point, in the mean of the logarithms.
 
-use std::path::Path;
+mod error;
+mod file;
 
-use certune_closed_loop::file::{FileError, KeyError, Location, Problem, read_text};
+use std::collections::BTreeMap;
+
+use certune_closed_loop::{Gains, PerJoint};
 use serde::{Deserialize, Serialize};
 
-use crate::gains::{Gain, Gains};
-use crate::goals::{Bound, Goal, GoalError, Goals, Limit};
+use crate::goals::Goals;
 
-/// The version of the file that this crate reads.
-pub const SPACE_SCHEMA: i64 = 1;
+pub use error::SpaceError;
+pub use file::{SPACE_SCHEMA, Setting, SpaceFile, Tie};
 
 /// Significant decimal digits of a gain that the search proposes.
 const DIGITS: usize = 5;
 
-/// Why a search space was refused.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum SpaceError {
-    /// The text is not TOML, is of another schema, holds an unknown key, or lacks one.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// The file reads well, but what it says makes no space.
-    #[error("{location}: {problem}")]
-    At {
-        /// Where in the file.
-        location: Location,
-        /// What is wrong there.
-        problem: Box<SpaceError>,
-    },
-    /// Goals that make no sense.
-    #[error(transparent)]
-    Goals(#[from] GoalError),
-    /// A controller that this crate cannot tune yet.
-    #[error(
-        "controller = \"mrac\": gains of the model-reference controller can be simulated but not tuned yet; expected \"aic\""
-    )]
-    MracNotTunable,
-    /// A gain is neither fixed nor free.
-    #[error("{gain} is missing: give it a value in [fixed] or bounds in [gains.{gain}]")]
-    Missing {
-        /// The gain.
-        gain: Gain,
-    },
-    /// A gain is both fixed and free.
-    #[error("{gain} is in [fixed] and in [gains.{gain}]: keep one of the two")]
-    Twice {
-        /// The gain.
-        gain: Gain,
-    },
-    /// Nothing is left to search.
-    #[error("every gain is fixed: give at least one of them bounds in [gains.<name>]")]
-    NothingFree,
-    /// All six gains of the redundant direction are free.
-    #[error(
-        "both kappas and all four sigmas are free, but multiplying all six by one number changes nothing: fix one of them, for instance sigma_q = 1.0"
-    )]
-    Redundant,
-    /// A fixed gain is not a positive number.
-    #[error("{gain} = {value}, expected a positive finite number")]
-    Fixed {
-        /// The gain.
-        gain: Gain,
-        /// The value given.
-        value: f64,
-    },
-    /// A bound is not a positive number; every gain of the controller is one.
-    #[error("gains.{gain}: the bounds are {lower} and {upper}, expected positive finite numbers")]
-    Bounds {
-        /// The gain.
-        gain: Gain,
-        /// The lower bound given.
-        lower: f64,
-        /// The upper bound given.
-        upper: f64,
-    },
-    /// An empty or inverted range.
-    #[error("gains.{gain}: lower = {lower} is not below upper = {upper}")]
-    Inverted {
-        /// The gain.
-        gain: Gain,
-        /// The lower bound given.
-        lower: f64,
-        /// The upper bound given.
-        upper: f64,
-    },
-    /// A start outside the bounds.
-    #[error("the search cannot start at {gain} = {value}, which is outside its bounds {lower} to {upper}")]
-    StartOutside {
-        /// The gain.
-        gain: Gain,
-        /// Its value at the start.
-        value: f64,
-        /// The lower bound.
-        lower: f64,
-        /// The upper bound.
-        upper: f64,
-    },
-    /// A start that disagrees with a fixed gain.
-    #[error("the search cannot start at {gain} = {value}: the space fixes it at {fixed}")]
-    StartNotFixed {
-        /// The gain.
-        gain: Gain,
-        /// Its value at the start, after scaling the start to the space's `sigma_q`.
-        value: f64,
-        /// The value that the space fixes.
-        fixed: f64,
-    },
-}
-
-impl SpaceError {
-    /// The key of the file that the error speaks of, by its path from the top; empty for the file as a whole.
-    fn key(&self) -> String {
-        match self {
-            Self::File(FileError { location, .. }) | Self::At { location, .. } => location.key.clone(),
-            Self::Goals(error) => error.key(),
-            Self::MracNotTunable => "controller".to_owned(),
-            Self::Fixed { gain, .. } => format!("fixed.{gain}"),
-            Self::Twice { gain } | Self::Bounds { gain, .. } | Self::Inverted { gain, .. } => format!("gains.{gain}"),
-            Self::NothingFree => "fixed".to_owned(),
-            Self::Redundant | Self::Missing { .. } => "gains".to_owned(),
-            Self::StartOutside { .. } | Self::StartNotFixed { .. } => "search.start".to_owned(),
-        }
-    }
-}
+/// Numbers closer than this, as a fraction, differ by their rounding.
+const ROUNDING: f64 = 1e-4;
 
 /// How a search proceeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -191,23 +108,23 @@ pub enum Method {
     ParticleSwarm,
 }
 
-/// On which scale a gain moves evenly.
+/// On which scale a knob moves evenly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Scale {
-    /// Equal steps multiply the gain by equal factors.
+    /// Equal steps multiply the value by equal factors.
     Log,
     /// Equal steps add equal amounts.
     Linear,
 }
 
-/// Bounds and scale of one free gain.
+/// Bounds and scale of a knob.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Range {
-    /// The smallest value, in the gain's unit.
+    /// The smallest value, in the knob's unit.
     pub lower: f64,
-    /// The largest value, in the gain's unit.
+    /// The largest value, in the knob's unit.
     pub upper: f64,
     /// The scale.
     pub scale: Scale,
@@ -243,185 +160,99 @@ fn rounded(value: f64) -> f64 {
     format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
 }
 
-/// One entry per gain, as a table of a file.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields, bound = "T: Deserialize<'de>")]
-struct PerGain<T> {
-    kappa_mu: Option<T>,
-    kappa_a: Option<T>,
-    sigma_q: Option<T>,
-    sigma_dq: Option<T>,
-    sigma_mu: Option<T>,
-    sigma_dmu: Option<T>,
-    reference_time_constant_s: Option<T>,
+/// A coordinate of the space, and the numbers that it sets.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Knob {
+    /// Its name in the file.
+    pub name: String,
+    /// Its bounds and scale.
+    #[serde(flatten)]
+    pub range: Range,
+    /// How it sets its numbers.
+    pub tie: Tie,
+    /// What one unit of it puts on the joints of each of its rows; zero where another knob sets the number.
+    pub per_unit: BTreeMap<String, PerJoint>,
 }
 
-impl<T: Copy> PerGain<T> {
-    const fn get(&self, gain: Gain) -> Option<T> {
-        match gain {
-            Gain::KappaMu => self.kappa_mu,
-            Gain::KappaA => self.kappa_a,
-            Gain::SigmaQ => self.sigma_q,
-            Gain::SigmaDq => self.sigma_dq,
-            Gain::SigmaMu => self.sigma_mu,
-            Gain::SigmaDmu => self.sigma_dmu,
-            Gain::ReferenceTimeConstantS => self.reference_time_constant_s,
-        }
+impl Knob {
+    fn new(name: &str, range: Range, tie: Tie) -> Self {
+        Self { name: name.to_owned(), range, tie, per_unit: BTreeMap::new() }
     }
-}
 
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum FileController {
-    Aic,
-    Mrac,
-}
+    /// The numbers of `gains` that the knob sets, each over what one unit puts there.
+    fn values(&self, gains: &Gains) -> Vec<f64> {
+        let mut values = Vec::new();
+        for (row, per_unit) in &self.per_unit {
+            let Some(numbers) = gains.row(row) else { continue };
+            let places = per_unit.values().len().max(numbers.values().len());
+            let pairs = (0..places).filter_map(|joint| Some((numbers.of(joint)?, per_unit.of(joint)?)));
+            values.extend(pairs.filter(|(_, unit)| *unit > 0.0).map(|(number, unit)| number / unit));
+        }
+        values
+    }
 
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FileSearch {
-    method: Method,
-    start: Option<String>,
-    #[serde(default)]
-    objective: Goal,
-    cvar: Option<f64>,
-}
-
-/// [`Goal::key`] by [`Goal::key`], so that an unknown key is refused by its name.
-#[derive(Clone, Copy, Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FileLimits {
-    settling_cost_s: Option<Bound>,
-    settling_time_s: Option<Bound>,
-    final_error_rad: Option<Bound>,
-    itae_rad_s2: Option<Bound>,
-    overshoot: Option<Bound>,
-    torque_rate_rms_n_m_per_s: Option<Bound>,
-    peak_torque_n_m: Option<Bound>,
-    energy_j: Option<Bound>,
-    certified_rate_per_s: Option<Bound>,
-    certified_radius_rad: Option<Bound>,
-    delay_margin_s: Option<Bound>,
-}
-
-impl FileLimits {
-    const fn get(&self, goal: Goal) -> Option<Bound> {
-        match goal {
-            Goal::SettlingCost => self.settling_cost_s,
-            Goal::SettlingTime => self.settling_time_s,
-            Goal::FinalError => self.final_error_rad,
-            Goal::Itae => self.itae_rad_s2,
-            Goal::Overshoot => self.overshoot,
-            Goal::Jitter => self.torque_rate_rms_n_m_per_s,
-            Goal::PeakTorque => self.peak_torque_n_m,
-            Goal::Energy => self.energy_j,
-            Goal::CertifiedRate => self.certified_rate_per_s,
-            Goal::CertifiedRadius => self.certified_radius_rad,
-            Goal::DelayMargin => self.delay_margin_s,
+    /// The value at which the knob is nearest to `gains`: exactly theirs when all numbers agree, the mean of their logarithms otherwise.
+    pub fn value(&self, gains: &Gains) -> f64 {
+        let values = self.values(gains);
+        match values.split_first() {
+            Some((first, rest)) if rest.iter().all(|value| value.to_bits() == first.to_bits()) => *first,
+            _ => (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp(),
         }
     }
 
-    fn all(&self) -> Vec<Limit> {
-        Goal::ALL.into_iter().filter_map(|goal| Some(Limit { goal, bound: self.get(goal)? })).collect()
+    /// `gains` with every number of the knob set anew, from the old number and what one unit puts there.
+    fn set(&self, mut gains: Gains, number: impl Fn(f64, f64) -> f64) -> Gains {
+        for (row, per_unit) in &self.per_unit {
+            let Some(numbers) = gains.row(row).cloned() else { continue };
+            let at = |joint: usize| {
+                let (old, unit) = (numbers.of(joint).unwrap_or(0.0), per_unit.of(joint).unwrap_or(0.0));
+                if unit > 0.0 { number(old, unit) } else { old }
+            };
+            let joints = numbers.values().len().max(per_unit.values().len());
+            let list = matches!((&numbers, per_unit), (PerJoint::Each(_), _) | (_, PerJoint::Each(_)));
+            let set = if list { PerJoint::Each((0..joints).map(at).collect()) } else { PerJoint::Shared(at(0)) };
+            gains = gains.with(row, set);
+        }
+        gains
+    }
+
+    /// `gains` with every number of the knob times `factor`.
+    #[must_use]
+    pub fn scaled(&self, gains: &Gains, factor: f64) -> Gains {
+        self.set(gains.clone(), |old, _| old * factor)
     }
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    controller: FileController,
-    search: FileSearch,
-    #[serde(default)]
-    limits: FileLimits,
-    fixed: PerGain<f64>,
-    gains: PerGain<Range>,
-}
-
-/// What one gain may be.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum Freedom {
-    /// It stays.
-    Fixed(f64),
-    /// It moves.
-    Free(Range),
-}
-
-/// A validated search space of the active inference controller.
+/// A validated search space on an arm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Space {
     method: Method,
-    start: Option<String>,
     goals: Goals,
-    /// In the order of [`Gain::ALL`].
-    freedoms: [Freedom; 7],
+    /// The fixed rows; the numbers of the others mean nothing.
+    fixed: Gains,
+    knobs: Vec<Knob>,
 }
 
 impl Space {
-    /// Reads a space from the text of a file; `file` names the text in errors.
-    ///
-    /// # Errors
-    /// [`SpaceError::File`] or [`SpaceError::At`], with the line, the key and the numbers.
-    pub fn parse(file: &Path, text: &str) -> Result<Self, SpaceError> {
-        let read: File = read_text(file, text, SPACE_SCHEMA)?;
-        Self::from_file(read).map_err(|error| {
-            let place = KeyError { key: error.key(), problem: Problem::MissingKey }.locate(file, text);
-            SpaceError::At { location: place.location, problem: Box::new(error) }
-        })
-    }
-
-    fn from_file(file: File) -> Result<Self, SpaceError> {
-        match file.controller {
-            FileController::Aic => {}
-            FileController::Mrac => return Err(SpaceError::MracNotTunable),
-        }
-        let mut freedoms = [Freedom::Fixed(1.0); 7];
-        for (slot, gain) in freedoms.iter_mut().zip(Gain::ALL) {
-            *slot = match (file.fixed.get(gain), file.gains.get(gain)) {
-                (Some(value), None) => Freedom::Fixed(value),
-                (None, Some(range)) => Freedom::Free(range),
-                (Some(_), Some(_)) => return Err(SpaceError::Twice { gain }),
-                (None, None) => return Err(SpaceError::Missing { gain }),
-            };
-        }
-        let default = Goals::default();
-        let goals = Goals {
-            objective: file.search.objective,
-            cvar: file.search.cvar.unwrap_or(default.cvar),
-            limits: file.limits.all(),
-        };
-        goals.validate()?;
-        Self::new(file.search.method, file.search.start, freedoms).map(|space| Self { goals, ..space })
-    }
-
-    /// A space from its parts, `freedoms` in the order of [`Gain::ALL`].
-    ///
-    /// # Errors
-    /// [`SpaceError`] with the gain and the numbers.
-    pub fn new(method: Method, start: Option<String>, freedoms: [Freedom; 7]) -> Result<Self, SpaceError> {
-        for (freedom, gain) in freedoms.into_iter().zip(Gain::ALL) {
-            match freedom {
-                Freedom::Fixed(value) if value > 0.0 && value.is_finite() => {}
-                Freedom::Fixed(value) => return Err(SpaceError::Fixed { gain, value }),
-                Freedom::Free(Range { lower, upper, .. }) => {
-                    if !(lower > 0.0 && upper > 0.0 && lower.is_finite() && upper.is_finite()) {
-                        return Err(SpaceError::Bounds { gain, lower, upper });
+    /// Every number of a row that is not fixed is set by exactly one knob.
+    fn set_each_number_once(&self, joints: usize) -> Result<(), SpaceError> {
+        for (row, _) in self.fixed.rows() {
+            let users = || self.knobs.iter().filter_map(|knob| Some((knob, knob.per_unit.get(row)?)));
+            if users().next().is_none() {
+                continue;
+            }
+            for joint in 0..joints {
+                let mut setting = users().filter(|(_, per_unit)| per_unit.of(joint).is_some_and(|unit| unit > 0.0));
+                match (setting.next(), setting.next()) {
+                    (None, _) => return Err(SpaceError::MissingJoint { row, joint: joint + 1 }),
+                    (Some((one, _)), Some((other, _))) => {
+                        return Err(SpaceError::Shared { row, knob: one.name.clone(), other: other.name.clone() });
                     }
-                    if lower >= upper {
-                        return Err(SpaceError::Inverted { gain, lower, upper });
-                    }
+                    (Some(_), None) => {}
                 }
             }
         }
-        let free = |freedom: &Freedom| matches!(freedom, Freedom::Free(_));
-        if !freedoms.iter().any(free) {
-            return Err(SpaceError::NothingFree);
-        }
-        let scaled = Gain::ALL.iter().zip(&freedoms).filter(|(gain, _)| **gain != Gain::ReferenceTimeConstantS);
-        if scaled.clone().all(|(_, freedom)| free(freedom)) {
-            return Err(SpaceError::Redundant);
-        }
-        Ok(Self { method, start, goals: Goals::default(), freedoms })
+        Ok(())
     }
 
     /// The method that the file asks for.
@@ -440,78 +271,114 @@ impl Space {
         &self.goals
     }
 
-    /// The name of the preset at which the search starts.
-    pub fn start(&self) -> Option<&str> {
-        self.start.as_deref()
+    /// The knobs, in the order of the coordinates.
+    pub fn knobs(&self) -> &[Knob] {
+        &self.knobs
     }
 
-    /// Fixed value or range of `gain`.
-    pub const fn freedom(&self, gain: Gain) -> Freedom {
-        self.freedoms[gain as usize]
-    }
-
-    /// The free gains with their ranges, in the order of the coordinates.
-    pub fn free(&self) -> impl Iterator<Item = (Gain, Range)> + '_ {
-        Gain::ALL.into_iter().zip(&self.freedoms).filter_map(|(gain, freedom)| match freedom {
-            Freedom::Free(range) => Some((gain, *range)),
-            Freedom::Fixed(_) => None,
-        })
+    /// The fixed rows with their keys, in the order of a gains file.
+    pub fn fixed(&self) -> impl Iterator<Item = (&'static str, &PerJoint)> {
+        let is_free = |row: &str| self.knobs.iter().any(|knob| knob.per_unit.contains_key(row));
+        self.fixed.rows().into_iter().filter(move |(row, _)| !is_free(row))
     }
 
     /// The number of coordinates, at least 1.
     pub fn dimension(&self) -> usize {
-        self.free().count()
+        self.knobs.len()
     }
 
     /// The gains at a point. Total: a coordinate outside `[0, 1]` is folded back, a missing one counts as 0.
     pub fn decode(&self, point: &[f64]) -> Gains {
         let mut coordinates = point.iter().copied();
-        let mut gains = Gains {
-            kappa_mu: 1.0,
-            kappa_a: 1.0,
-            sigma_q: 1.0,
-            sigma_dq: 1.0,
-            sigma_mu: 1.0,
-            sigma_dmu: 1.0,
-            reference_time_constant_s: 1.0,
-        };
-        for gain in Gain::ALL {
-            let value = match self.freedom(gain) {
-                Freedom::Fixed(value) => value,
-                Freedom::Free(range) => range.decode(coordinates.next().unwrap_or(0.0)),
-            };
-            gains = gains.with(gain, value);
-        }
-        gains
+        self.knobs.iter().fold(self.fixed.clone(), |gains, knob| {
+            let value = knob.range.decode(coordinates.next().unwrap_or(0.0));
+            // A bound may have more digits, and stays what it is.
+            knob.set(gains, |_, unit| if (unit - 1.0).abs() > 0.0 { rounded(value * unit) } else { value })
+        })
     }
 
-    /// The point of `gains` that lie in the space; the inverse of [`Space::decode`] up to the rounding of the gains.
+    /// The nearest point to `gains`; for those of the space the inverse of [`Space::decode`] up to the rounding of the gains.
     pub fn encode(&self, gains: &Gains) -> Vec<f64> {
-        self.free().map(|(gain, range)| range.encode(gains.get(gain))).collect()
+        self.knobs.iter().map(|knob| knob.range.encode(knob.value(gains))).collect()
     }
 
-    /// The same control law as `gains`, written with the space's fixed `sigma_q` if it has one, and checked to lie in the space.
+    /// `gains` as the space writes them: the same control law of an AIC in the scale of the fixed `sigma_q`, the gains of an MRAC under the space's law.
     ///
     /// # Errors
-    /// [`SpaceError::StartOutside`] or [`SpaceError::StartNotFixed`] with the first gain that does not fit.
+    /// [`SpaceError::StartController`] for gains of another controller.
+    pub fn written(&self, gains: &Gains) -> Result<Gains, SpaceError> {
+        match (&self.fixed, gains) {
+            (Gains::Aic(fixed), Gains::Aic(table)) => {
+                let is_fixed = self.fixed().any(|(row, _)| row == "sigma_q");
+                let [wanted, found] = [&fixed.sigma_q, &table.sigma_q].map(PerJoint::shared);
+                Ok(match (wanted.filter(|_| is_fixed), found) {
+                    (Some(wanted), Some(found)) if (wanted - found).abs() > 0.0 => rescaled(gains, wanted, found),
+                    _ => gains.clone(),
+                })
+            }
+            (Gains::Mrac(fixed), Gains::Mrac(table)) => {
+                let mut table = table.clone();
+                table.law = fixed.law;
+                Ok(Gains::Mrac(table))
+            }
+            (fixed, gains) => {
+                Err(SpaceError::StartController { found: gains.controller(), expected: fixed.controller() })
+            }
+        }
+    }
+
+    /// `gains` as the space writes them, checked to be a start of a search in it.
+    ///
+    /// # Errors
+    /// [`SpaceError`] with the first number that does not fit.
     pub fn admit(&self, gains: &Gains) -> Result<Gains, SpaceError> {
-        let admitted = match self.freedom(Gain::SigmaQ) {
-            Freedom::Fixed(sigma_q) if (sigma_q - gains.sigma_q).abs() > 0.0 => gains.rescaled(sigma_q),
-            Freedom::Fixed(_) | Freedom::Free(_) => *gains,
-        };
-        for gain in Gain::ALL {
-            let value = admitted.get(gain);
-            match self.freedom(gain) {
-                Freedom::Free(Range { lower, upper, .. }) if value >= lower && value <= upper => {}
-                Freedom::Free(Range { lower, upper, .. }) => {
-                    return Err(SpaceError::StartOutside { gain, value, lower, upper });
+        let admitted = self.written(gains)?;
+        for (row, fixed) in self.fixed() {
+            let Some(numbers) = admitted.row(row) else { continue };
+            for joint in 0..numbers.values().len().max(fixed.values().len()) {
+                let (value, fixed) = (numbers.of(joint).unwrap_or(f64::NAN), fixed.of(joint).unwrap_or(f64::NAN));
+                if !((value - fixed).abs() <= fixed * f64::EPSILON) {
+                    return Err(SpaceError::StartNotFixed { row, value, fixed });
                 }
-                Freedom::Fixed(fixed) if (value - fixed).abs() <= fixed * f64::EPSILON => {}
-                Freedom::Fixed(fixed) => return Err(SpaceError::StartNotFixed { gain, value, fixed }),
+            }
+        }
+        for knob in &self.knobs {
+            let values = knob.values(&admitted);
+            let (first, Range { lower, upper, .. }) = (values.first().copied().unwrap_or(f64::NAN), knob.range);
+            if knob.tie == Tie::Shared
+                && let Some(other) = values.iter().find(|value| value.to_bits() != first.to_bits())
+            {
+                let row = admitted.rows().into_iter().find(|(row, _)| knob.per_unit.contains_key(*row));
+                let row = row.map_or("", |(row, _)| row);
+                return Err(SpaceError::StartNotTied { knob: knob.name.clone(), row, first, other: *other });
+            }
+            let slack = if knob.tie == Tie::Shared { 0.0 } else { ROUNDING };
+            let value = knob.value(&admitted);
+            let inside = value >= lower * (1.0 - slack) && value <= upper * (1.0 + slack);
+            if knob.tie != Tie::Inertia && !inside {
+                return Err(SpaceError::StartOutside { knob: knob.name.clone(), value, lower, upper });
             }
         }
         Ok(admitted)
     }
+}
+
+/// The same control law with `sigma_q = wanted`: the kappas and the sigmas times `wanted / found`.
+fn rescaled(gains: &Gains, wanted: f64, found: f64) -> Gains {
+    let factor = wanted / found;
+    let scaled = |numbers: &PerJoint| match numbers {
+        PerJoint::Shared(value) => PerJoint::Shared(value * factor),
+        PerJoint::Each(list) => PerJoint::Each(list.iter().map(|value| value * factor).collect()),
+    };
+    let mut written = gains.clone();
+    for (row, numbers) in gains.rows() {
+        if row == "sigma_q" {
+            written = written.with(row, PerJoint::Shared(wanted));
+        } else if row != "reference_time_constant_s" {
+            written = written.with(row, scaled(numbers));
+        }
+    }
+    written
 }
 
 #[cfg(test)]

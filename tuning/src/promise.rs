@@ -1,0 +1,64 @@
+//! What a tuned set of gains must have certified before it is written.
+//!
+//! | gains | claims | certificates |
+//! |---|---|---|
+//! | AIC, the same on every joint | `exponential`, `region` | one |
+//! | AIC, joint by joint | `joint-region` | one |
+//! | MRAC | `adaptive-convergence`, `pi-exponential`, `adaptive-sampled` | one for each goal of the scenario: they are about a box around a goal |
+
+use certune::closed_loop::{Gains, Scenario};
+use certune::verify::{Certificate, ClaimKind};
+use certune::{ArmCertifier, ArmGains, Request, StabilityError};
+
+/// The goals of a scenario, each once, in their order.
+pub fn goals(scenario: &Scenario) -> Vec<&[f64]> {
+    let mut goals: Vec<&[f64]> = Vec::new();
+    for segment in &scenario.segments {
+        if !goals.contains(&segment.goal_rad.as_slice()) {
+            goals.push(&segment.goal_rad);
+        }
+    }
+    goals
+}
+
+/// How many certificates a winner has.
+pub fn certificates(gains: &Gains, scenario: &Scenario) -> usize {
+    match gains {
+        Gains::Aic(_) => 1,
+        Gains::Mrac(_) => goals(scenario).len(),
+    }
+}
+
+/// The certificates of `gains`, up to the first that does not hold. The gains keep the promise if all hold.
+pub fn certify<const N: usize>(
+    certifier: &ArmCertifier<N>,
+    scenario: &Scenario,
+    gains: &Gains,
+) -> Result<Vec<Certificate>, StabilityError> {
+    let bound = ArmGains::<N>::bind(gains)?;
+    let asked: Vec<Request> = match gains {
+        Gains::Aic(_) if bound.are_shared() => {
+            vec![Request { claims: vec![ClaimKind::Exponential, ClaimKind::Region], ..Request::default() }]
+        }
+        Gains::Aic(_) => vec![Request { claims: vec![ClaimKind::JointRegion], ..Request::default() }],
+        Gains::Mrac(_) => goals(scenario)
+            .into_iter()
+            .map(|goal| Request {
+                claims: vec![ClaimKind::AdaptiveConvergence, ClaimKind::PiExponential, ClaimKind::AdaptiveSampled],
+                delay_samples: Some(scenario.plant_box.delay_samples[1]),
+                at_rad: Some(goal.to_vec()),
+                ..Request::default()
+            })
+            .collect(),
+    };
+    let mut made = Vec::new();
+    for request in &asked {
+        let certificate = certifier.answer(&bound, request)?.certificate;
+        let holds = certificate.all_hold();
+        made.push(certificate);
+        if !holds {
+            break;
+        }
+    }
+    Ok(made)
+}
