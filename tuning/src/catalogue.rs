@@ -110,6 +110,12 @@ pub fn robot(given: &str, tip: Option<&str>) -> Result<Robot, Error> {
     if (1..=MOST_JOINTS).contains(&robot.joints()) { Ok(robot) } else { Err(too_many_joints(&robot)) }
 }
 
+/// Where the file of a robot is that is not built in, whatever folder it is asked for from.
+pub fn robot_file(given: &str) -> Result<Option<PathBuf>, Error> {
+    let absolute = |given| std::path::absolute(given).map_err(output::cannot("find", Path::new(given)));
+    Robot::built_in(given).is_none().then(|| absolute(given)).transpose()
+}
+
 /// For a dispatch over the number of joints that found no match.
 pub fn too_many_joints(robot: &Robot) -> Error {
     Error::Joints { robot: robot.name().to_owned(), joints: robot.joints(), most: MOST_JOINTS }
@@ -234,11 +240,19 @@ fn record(path: &Path, text: &str) -> Result<Record, Error> {
         .map_err(|source| Error::RecordRejected { path: path.to_path_buf(), source })
 }
 
-/// The search space of that file with a name for the record, or the built-in one.
-pub fn space(given: Option<&str>) -> Result<(String, Space), Error> {
+/// A search space with the text it was read from.
+pub struct SpaceSource {
+    /// The name for the record.
+    pub name: String,
+    pub text: String,
+    pub space: Space,
+}
+
+/// The search space of that file, or the built-in one.
+pub fn space(given: Option<&str>) -> Result<SpaceSource, Error> {
     let Text { file, text, .. } = find(Kind::Space, given.unwrap_or(SPACES[0].0), &SPACES)?;
     let name = Path::new(given.unwrap_or(SPACES[0].0)).file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    Ok((name.unwrap_or_default(), Space::parse(&file, &text)?))
+    Ok(SpaceSource { name: name.unwrap_or_default(), space: Space::parse(&file, &text)?, text })
 }
 
 #[cfg(test)]
@@ -285,7 +299,7 @@ mod tests {
                 record.arm.name
             );
         }
-        let (name, space) = space(None).unwrap();
+        let SpaceSource { name, space, .. } = space(None).unwrap();
         assert!(name == "panda-aic" && space.start() == Some(DEFAULT_PRESET));
         assert!(BUILT_IN.iter().all(|name| !robot_in_words(name).is_empty()));
     }

@@ -58,6 +58,10 @@ impl Folder {
     pub fn report(&self) -> PathBuf {
         self.path.join("report.html")
     }
+    /// There exactly while the run is not finished.
+    pub fn journal(&self) -> PathBuf {
+        self.path.join("journal.jsonl")
+    }
 
     /// Reads `run.json` and `certificate.json`, which is checked, not believed.
     pub fn read(&self) -> Result<Run, Error> {

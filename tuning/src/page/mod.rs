@@ -13,13 +13,13 @@ use certune::report::{
     Asked, CommandLine, CostMeaning, Evaluation, GainRow, Pair, RangeRow, SearchBounds, SearchRecord, SensitivityRow,
     TuningReport, Version, tuning_report,
 };
-use certune::tune::{Freedom, Gain, Gains, ObjectiveName, Outcome, Phase, RunRecord, Scale};
+use certune::tune::{Freedom, Gain, Gains, ObjectiveName, Outcome, Phase, RunRecord, Scale, Termination};
 
 use crate::catalogue;
 use crate::error::Error;
 use crate::run::{Folder, Run};
 
-pub use figures::{Spread, spread};
+pub use figures::{FIGURES, Spread, spread};
 
 /// Two values this close, as a fraction of the range, are called the same.
 const ON_BOUND: f64 = 0.005;
@@ -310,6 +310,13 @@ fn method(run: &Run, certified: bool) -> Vec<String> {
             plants.payload_kg, plants.friction_n_m_s_per_rad, plants.rotor_inertia_kg_m2
         ),
     ];
+    if record.termination == Termination::Interrupted {
+        let budget = question.search.evaluations;
+        paragraphs.insert(
+            0,
+            format!("The search was interrupted before it had looked at the {budget} candidates that were asked for."),
+        );
+    }
     if !certified {
         paragraphs.insert(
             0,
