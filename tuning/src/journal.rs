@@ -46,8 +46,10 @@ pub enum JournalError {
     OtherVersions { recorded: String, found: String },
     #[error("the robot's description has changed since the run was begun: it hashes to {found}, then to {recorded}")]
     OtherRobot { recorded: String, found: String },
-    #[error("cannot append to {}: {source}; what it holds is kept", path.display())]
-    Append { path: PathBuf, source: std::io::Error },
+    #[error("cannot append to the journal in {}: {source}; what it holds is kept", folder.display())]
+    Append { folder: PathBuf, source: std::io::Error },
+    #[error("{source}; the journal is kept")]
+    Results { folder: PathBuf, source: Box<Error> },
     #[error("{} was removed while the run was going on", path.display())]
     Removed { path: PathBuf },
 }
@@ -70,10 +72,9 @@ impl JournalError {
             }
             Self::OtherVersions { .. } => Some(format!("the program that began it, or {anew}")),
             Self::OtherRobot { .. } => Some(format!("the robot's file as it was, or {anew}")),
-            Self::Append { path, .. } => Some(format!(
-                "make room there, then `autotune resume {}`",
-                path.parent().unwrap_or(Path::new(".")).display()
-            )),
+            Self::Append { folder, .. } | Self::Results { folder, .. } => {
+                Some(format!("make room there, then `autotune resume {}`", folder.display()))
+            }
             Self::Removed { .. } => Some(anew.to_owned()),
         }
     }
@@ -116,7 +117,7 @@ struct Generation {
 /// A journal that this process works on.
 #[derive(Debug)]
 pub struct Journal {
-    path: PathBuf,
+    folder: Folder,
     /// Locked; written at its end.
     file: File,
     generations: Vec<Generation>,
@@ -145,7 +146,7 @@ impl Journal {
             });
         };
         output::remove_staged(&folder.path);
-        Ok(Self { path, file, generations: Vec::new() })
+        Ok(Self { folder: folder.clone(), file, generations: Vec::new() })
     }
 
     /// The journal of the unfinished run in `folder`, to go on with it.
@@ -160,7 +161,7 @@ impl Journal {
         let Content { header, generations, whole } = Content::read(&path, &mut file)?;
         file.set_len(whole).and_then(|()| file.seek(SeekFrom::End(0))).map_err(cannot("write", &path))?;
         output::remove_staged(&folder.path);
-        Ok((header, Self { path, file, generations }))
+        Ok((header, Self { folder: folder.clone(), file, generations }))
     }
 
     /// What the journal in `folder` says now; whoever works on it is not disturbed.
@@ -177,24 +178,35 @@ impl Journal {
 
     /// The run is finished, and its files are in place.
     pub fn finish(self) -> Result<(), Error> {
-        output::remove_file(&self.path)
+        output::remove_file(&self.folder.journal())
+    }
+
+    /// The files of the run could not be put in place.
+    pub fn without_results(&self, source: Error) -> Error {
+        match self.still_there() {
+            Ok(()) => JournalError::Results { folder: self.folder.path.clone(), source: Box::new(source) }.into(),
+            Err(removed) => removed.into(),
+        }
     }
 
     /// The run has failed. A journal without a generation is worth nothing, unless the disk is what failed.
     pub fn fail(self, error: &Error) -> Result<(), Error> {
         if self.generations.is_empty() && !matches!(error, Error::Journal(_)) {
-            return output::remove_file(&self.path);
+            return output::remove_file(&self.folder.journal());
         }
         Ok(())
     }
 
+    fn still_there(&self) -> Result<(), JournalError> {
+        let path = self.folder.journal();
+        if path.exists() { Ok(()) } else { Err(JournalError::Removed { path }) }
+    }
+
     fn append(&mut self, generation: Generation) -> Result<(), Error> {
-        if !self.path.exists() {
-            return Err(JournalError::Removed { path: self.path.clone() }.into());
-        }
+        self.still_there()?;
         let text = line(&generation)?;
         let written = self.file.write_all(text.as_bytes()).and_then(|()| self.file.sync_data());
-        written.map_err(|source| JournalError::Append { path: self.path.clone(), source })?;
+        written.map_err(|source| JournalError::Append { folder: self.folder.path.clone(), source })?;
         self.generations.push(generation);
         Ok(())
     }
@@ -295,7 +307,7 @@ impl Book<'_> {
         if let Some(recorded) = self.journal.generations.get(self.answered) {
             // Positive finite numbers: equal ones have equal bits.
             if recorded.asked != asked {
-                let (path, line) = (self.journal.path.clone(), self.answered + 2);
+                let (path, line) = (self.journal.folder.journal(), self.answered + 2);
                 return Err(JournalError::OtherCandidates { path, line }.into());
             }
             self.answered += 1;

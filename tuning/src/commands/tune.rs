@@ -96,7 +96,7 @@ pub fn carry_out(plan: &Plan, mut journal: Journal, threads: Option<usize>, cont
             return Err(error);
         }
     };
-    let files = plan.folder.write(&run, &page)?;
+    let files = plan.folder.write(&run, &page).map_err(|error| journal.without_results(error))?;
     let interrupted = run.file.record.termination == Termination::Interrupted;
     if !interrupted {
         journal.finish()?;

@@ -188,7 +188,7 @@ fn a_journal_of_other_candidates_is_refused_and_kept() {
     let (_, bytes) = bench.whole();
     let text = String::from_utf8(bytes).unwrap();
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
-    let edited = lines[3].replacen("\"sigma_mu\":5.0", "\"sigma_mu\":5.000000000000001", 1);
+    let edited = lines[3].replacen("\"sigma_q\":1.0", "\"sigma_q\":1.0000000000000002", 1);
     assert_ne!(edited, lines[3]);
     lines[3] = edited;
     let text = lines.join("\n") + "\n";

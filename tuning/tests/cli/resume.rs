@@ -120,6 +120,7 @@ fn ctrl_c_leaves_a_report_and_a_run_that_ends_the_same() {
         let said = String::from_utf8(assert.get_output().stderr.clone()).unwrap();
         assert!(said.contains("another process is at work"), "{said}");
     }
+    assert_eq!(json(folder.path(), "runs .", 0)[0]["state"], "running");
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     assert_eq!(child.wait().unwrap().code(), Some(130));
     let record: serde_json::Value = serde_json::from_slice(&files(folder.path())["run.json"]).unwrap();
@@ -144,13 +145,13 @@ fn a_full_disk_is_an_error_that_keeps_what_is_there() {
     let expected = whole(TUNE, 2);
     let folder = place();
     let limited = |arguments: &str| {
-        let script = format!("trap '' XFSZ; ulimit -f 24; exec {} {arguments}", env!("CARGO_BIN_EXE_autotune"));
+        let script = format!("trap '' XFSZ; ulimit -f 10; exec {} {arguments}", env!("CARGO_BIN_EXE_autotune"));
         let output = Command::new("sh").current_dir(folder.path()).args(["-c", &script]).output().unwrap();
         (output.status.code(), String::from_utf8(output.stderr).unwrap())
     };
     let (code, said) = limited(TUNE);
     assert_eq!(code, Some(1), "{said}");
-    assert!(said.contains("cannot append to") && said.contains("autotune resume run"), "{said}");
+    assert!(said.contains("cannot append to the journal in run") && said.contains("autotune resume run"), "{said}");
     assert_eq!(files(folder.path()).keys().collect::<Vec<_>>(), ["journal.jsonl"]);
     let lines = journal_lines(folder.path());
     assert!(lines > 2, "{lines}");
@@ -158,6 +159,17 @@ fn a_full_disk_is_an_error_that_keeps_what_is_there() {
     assert_eq!(journal_lines(folder.path()), lines);
     stdout(folder.path(), "resume run", 0);
     assert_same(&files(folder.path()), &expected, "after a full disk");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_that_is_removed_is_an_error_and_not_made_again() {
+    let folder = place();
+    let child = under_way(folder.path(), TUNE);
+    std::fs::remove_dir_all(folder.path().join("run")).unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(!folder.path().join("run").exists());
 }
 
 #[test]
