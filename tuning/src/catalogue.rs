@@ -120,6 +120,12 @@ pub fn robot(given: &str, tip: Option<&str>) -> Result<Robot, Error> {
     if (1..=MOST_JOINTS).contains(&robot.joints()) { Ok(robot) } else { Err(too_many_joints(&robot)) }
 }
 
+/// Where the file of a robot is that is not built in, whatever folder it is asked for from.
+pub fn robot_file(given: &str) -> Result<Option<PathBuf>, Error> {
+    let absolute = |given| std::path::absolute(given).map_err(output::cannot("find", Path::new(given)));
+    Robot::built_in(given).is_none().then(|| absolute(given)).transpose()
+}
+
 /// For a dispatch over the number of joints that found no match.
 pub fn too_many_joints(robot: &Robot) -> Error {
     Error::Joints { robot: robot.name().to_owned(), joints: robot.joints(), most: MOST_JOINTS }
@@ -236,8 +242,16 @@ fn record(path: &Path, text: &str) -> Result<Record, Error> {
         .map_err(|source| Error::RecordRejected { path: path.to_path_buf(), source })
 }
 
-/// The search space of that file with a name for the record, or the built-in one of the controller.
-pub fn space(given: Option<&str>, controller: Option<ControllerName>) -> Result<(String, SpaceFile), Error> {
+/// A search space with the text it was read from.
+pub struct SpaceSource {
+    /// The name for the record.
+    pub name: String,
+    pub text: String,
+    pub space: SpaceFile,
+}
+
+/// The search space of that file, or the built-in one of the controller.
+pub fn space(given: Option<&str>, controller: Option<ControllerName>) -> Result<SpaceSource, Error> {
     let built_in = match controller {
         None | Some(ControllerName::Aic) => SPACES[0].0,
         Some(ControllerName::Mrac) => SPACES[1].0,
@@ -250,7 +264,7 @@ pub fn space(given: Option<&str>, controller: Option<ControllerName>) -> Result<
         Some(wanted) if wanted.name() != space.controller() => {
             Err(Error::OtherController { space: given.to_owned(), found: space.controller(), wanted: wanted.name() })
         }
-        _ => Ok((name.unwrap_or_default(), space)),
+        _ => Ok(SpaceSource { name: name.unwrap_or_default(), text, space }),
     }
 }
 
@@ -299,7 +313,7 @@ mod tests {
             );
         }
         for controller in [ControllerName::Aic, ControllerName::Mrac] {
-            let (name, space) = space(None, Some(controller)).unwrap();
+            let SpaceSource { name, space, .. } = space(None, Some(controller)).unwrap();
             assert_eq!((name, space.controller()), (format!("panda-{}", controller.name()), controller.name()));
             assert_eq!(space.start(), Some(default_preset(controller)));
         }

@@ -12,8 +12,11 @@ use certune::verify::ClaimKind;
 use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
-use crate::commands::{ask_tell, certify, constants, inspect, lists, report, simulate, tune, verify};
+use crate::commands::{
+    ask_tell, certify, constants, diff, evaluate, inspect, lists, report, resume, runs, simulate, tune, verify,
+};
 use crate::error::Error;
+use crate::interrupt;
 use crate::output;
 use crate::values::{
     ARMS_OWN, Interval, Numbers, claim, delay, interval, non_negative, numbers, objective, plants, share, threads,
@@ -27,7 +30,7 @@ Examples:
   autotune verify runs/panda-aic-1/certificate.json
   autotune presets                                  what --gains knows by name
 
-Exit codes: 0 every claim holds (conditional ones included), 2 a claim is refused, not proved or rejected, 1 usage, an unreadable file or any other error.";
+Exit codes: 0 every claim holds (conditional ones included), 2 a claim is refused, not proved or rejected, 1 usage, an unreadable file or any other error, 130 interrupted.";
 
 /// Tune the gains of a robot-arm controller, certify its stability, and report.
 #[derive(Debug, Parser)]
@@ -59,6 +62,14 @@ pub enum Command {
     Tune(TuneArgs),
     /// Search for gains with scores that you provide: candidates out and scores in, a JSON line each
     AskTell(AskTellArgs),
+    /// What becomes of gains that you provide: gains in and figures out, a JSON line each
+    Evaluate(EvaluateArgs),
+    /// Finish a run that was interrupted
+    Resume(ResumeArgs),
+    /// List the runs in a folder
+    Runs(RunsArgs),
+    /// Compare runs: what was asked, gains, and figures on held-out plants
+    Diff(DiffArgs),
     /// Certify that an arm with given gains is stable, or say why not
     Certify(CertifyArgs),
     /// Check certificates again, in exact arithmetic, from the files alone
@@ -166,6 +177,48 @@ pub struct AskTellArgs {
     /// Scenario whose plants those loops are about, by name or TOML file [default: pick-and-place; for a URDF file a generic one]
     #[arg(long, value_name = "NAME|FILE", requires = "robot")]
     pub scenario: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct EvaluateArgs {
+    #[command(flatten)]
+    pub robot: RobotArgs,
+    /// Search space whose goals judge: a TOML file [default: the built-in panda-aic]
+    #[arg(long, value_name = "FILE")]
+    pub space: Option<String>,
+    /// Scenario by name or TOML file [default: pick-and-place; for a URDF file a generic one]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub scenario: Option<String>,
+    /// Plants of the scenario's box on which each line's gains are simulated [default: 8]
+    #[arg(long, value_name = "N", value_parser = plants)]
+    pub plants: Option<usize>,
+    /// Seed of every random draw [default: 1]
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+}
+
+#[derive(Debug, Args)]
+pub struct ResumeArgs {
+    /// Folder of the run
+    #[arg(value_name = "RUN_DIR")]
+    pub run_dir: PathBuf,
+    /// Threads; the result does not depend on it [default: one per core]
+    #[arg(long, value_name = "T", value_parser = threads)]
+    pub threads: Option<usize>,
+}
+
+#[derive(Debug, Args)]
+pub struct RunsArgs {
+    /// Folder whose folders are runs [default: runs]
+    #[arg(value_name = "DIR")]
+    pub dir: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct DiffArgs {
+    /// Folders of runs
+    #[arg(value_name = "RUN_DIR", required = true, num_args = 2..)]
+    pub run_dirs: Vec<PathBuf>,
 }
 
 /// Which configurations a claim speaks of.
@@ -358,8 +411,10 @@ pub enum Exit {
     Holds,
     /// A claim is refused, not proved or rejected.
     NotCertified,
-    /// A file among several could not be read; it has been named.
+    /// A file or line among several could not be read; it has been named.
     Unreadable,
+    /// Ctrl-C has ended it before its end.
+    Interrupted,
 }
 
 impl From<Exit> for ExitCode {
@@ -368,6 +423,7 @@ impl From<Exit> for ExitCode {
             Exit::Holds => Self::SUCCESS,
             Exit::NotCertified => Self::from(2),
             Exit::Unreadable => Self::FAILURE,
+            Exit::Interrupted => interrupt::exit_code(),
         }
     }
 }
@@ -410,6 +466,10 @@ fn dispatch(cli: Cli) -> Result<Exit, Error> {
     match (cli.command, cli.tune) {
         (Some(Command::Tune(args)), _) | (None, Some(args)) => tune::run(&args, context),
         (Some(Command::AskTell(args)), _) => ask_tell::run(&args),
+        (Some(Command::Evaluate(args)), _) => evaluate::run(&args),
+        (Some(Command::Resume(args)), _) => resume::run(&args, context),
+        (Some(Command::Runs(args)), _) => runs::run(&args, context),
+        (Some(Command::Diff(args)), _) => diff::run(&args, context),
         (Some(Command::Certify(args)), _) => certify::run(&args, context),
         (Some(Command::Verify(args)), _) => verify::run(&args, context),
         (Some(Command::Constants(args)), _) => constants::run(&args, context),

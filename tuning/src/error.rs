@@ -11,6 +11,8 @@ use certune::report::ReportError;
 use certune::tune::{BatchError, Goal, SearchError, SpaceError, TuneError};
 use certune::verify::VerifyError;
 
+use crate::journal::JournalError;
+
 /// What a name on the command line is the name of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
@@ -82,6 +84,12 @@ pub enum Error {
     /// The operating system refused.
     #[error("cannot {action} {}: {source}", path.display())]
     Io { action: &'static str, path: PathBuf, source: io::Error },
+    /// Ctrl-C cannot be listened to.
+    #[error("cannot listen to Ctrl-C: {0}")]
+    Signal(io::Error),
+    /// Standard input cannot be read.
+    #[error("cannot read standard input: {0}")]
+    Stdin(io::Error),
     /// Standard output went away.
     #[error("cannot write to standard output: {0}")]
     Stdout(io::Error),
@@ -115,6 +123,9 @@ pub enum Error {
     /// A run on a URDF file, whose path is in no record.
     #[error("the run's robot `{robot}` is not built in, and its file is not part of the record")]
     RobotOfRun { robot: String },
+    /// The journal of a run that is not finished.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
     /// Something does not serialise, which would be a defect.
     #[error("the result cannot be written as JSON: {0}")]
     Json(#[from] serde_json::Error),
@@ -154,6 +165,7 @@ impl Error {
                 Some("another `start` in the search space, or wider bounds".to_owned())
             }
             Self::Io { action: "create", .. } => Some("--out with a folder that you may write to".to_owned()),
+            Self::Io { action: "list", .. } => Some("a folder that holds the folders of runs".to_owned()),
             Self::Io { action: "write", .. } => Some("another place that you may write to".to_owned()),
             Self::Certificate { .. } => Some("the certificate.json of a run, whole and unedited".to_owned()),
             Self::Rejected { .. } => Some("the certificate.json that the run wrote, or repeat the run".to_owned()),
@@ -167,6 +179,7 @@ impl Error {
             Self::OtherRobot { .. } | Self::RobotOfRun { .. } => {
                 Some("--robot with the URDF file of that run (and --tip, if it was named)".to_owned())
             }
+            Self::Journal(error) => error.advice(),
             Self::Threads { .. } => Some("a smaller --threads".to_owned()),
             Self::File(error) if matches!(*error.problem, certune::closed_loop::Problem::Unreadable { .. }) => None,
             Self::Io { .. }
@@ -179,6 +192,8 @@ impl Error {
             | Self::Batch(_)
             | Self::Tune(_)
             | Self::Report(_)
+            | Self::Signal(_)
+            | Self::Stdin(_)
             | Self::Stdout(_)
             | Self::Json(_) => None,
         }

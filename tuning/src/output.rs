@@ -1,6 +1,7 @@
 //! What leaves the program: tables, wrapped text, JSON, and files that are written whole or not at all.
 
 use std::fmt::Write as _;
+use std::fs::File;
 use std::io::{ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -8,6 +9,9 @@ use serde::Serialize;
 use tempfile::NamedTempFile;
 
 use crate::error::Error;
+
+/// How the names of files begin that are not in their places yet.
+const STAGED: &str = ".autotune-";
 
 /// Columns that running text is wrapped to.
 const WIDTH: usize = 100;
@@ -96,7 +100,7 @@ pub struct Staged {
     path: PathBuf,
 }
 
-fn cannot(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Error {
+pub fn cannot(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Error {
     let path = path.to_path_buf();
     move |source| Error::Io { action, path, source }
 }
@@ -117,7 +121,7 @@ impl Staged {
                 Some(_) | None => Path::new("."),
             };
             let mut builder = tempfile::Builder::new();
-            builder.prefix(".autotune-");
+            builder.prefix(STAGED);
             #[cfg(unix)]
             {
                 // A temporary file is private; a result is as readable as any file (the umask still applies).
@@ -130,6 +134,17 @@ impl Staged {
             Ok(Self { file, path: target.clone() })
         };
         stage().map_err(cannot("write", path))
+    }
+
+    /// Puts the file in its place, open, and locked by this process before anybody can see it; none when something is there already.
+    pub fn commit_new_locked(self) -> Result<Option<File>, Error> {
+        let path = self.path;
+        self.file.as_file().lock().map_err(cannot("lock", &path))?;
+        match self.file.persist_noclobber(&path) {
+            Ok(file) => Ok(Some(file)),
+            Err(error) if error.error.kind() == ErrorKind::AlreadyExists => Ok(None),
+            Err(error) => Err(cannot("write", &path)(error.error)),
+        }
     }
 
     /// Puts the file in its place, over whatever was there.
@@ -165,9 +180,18 @@ pub fn read_file(path: &Path) -> Result<String, Error> {
 pub fn prepare_folder(path: &Path) -> Result<(), Error> {
     let create = || {
         std::fs::create_dir_all(path)?;
-        tempfile::Builder::new().prefix(".autotune-").tempfile_in(path).map(drop)
+        tempfile::Builder::new().prefix(STAGED).tempfile_in(path).map(drop)
     };
     create().map_err(cannot("create", path))
+}
+
+/// Removes what a process that was killed had not put in its place.
+pub fn remove_staged(folder: &Path) {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    for entry in entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(STAGED)) {
+        // What cannot be removed is no harm: nobody reads it.
+        let _ = std::fs::remove_file(entry.path());
+    }
 }
 
 /// Removes a file that a run no longer stands for; one that is not there is as good.

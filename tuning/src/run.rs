@@ -64,6 +64,10 @@ impl Folder {
     pub fn report(&self) -> PathBuf {
         self.path.join("report.html")
     }
+    /// There exactly while the run is not finished.
+    pub fn journal(&self) -> PathBuf {
+        self.path.join("journal.jsonl")
+    }
 
     /// Reads `run.json` and the certificates, which are checked, not believed.
     pub fn read(&self) -> Result<Run, Error> {

@@ -315,7 +315,14 @@ impl<const N: usize> SimulatedObjective<'_, N> {
         Ok(figures)
     }
 
-    fn outcome<P: Parameters<N>>(&self, gains: &Gains, params: &P, enough: Option<Finite>) -> Outcome {
+    /// The outcome, where `simulate` runs the batch and is told what is enough.
+    fn outcome<P: Parameters<N>>(
+        &self,
+        gains: &Gains,
+        params: &P,
+        enough: Option<Finite>,
+        simulate: impl FnOnce(Option<Finite>) -> Outcome,
+    ) -> Outcome {
         let growth_per_s = self.filter.growth_per_s(params);
         if growth_per_s.get() >= 0.0 {
             return Outcome::Unstable { abscissa_per_s: growth_per_s };
@@ -341,7 +348,7 @@ impl<const N: usize> SimulatedObjective<'_, N> {
             (Some(found), _) if goals.from(Source::Simulated).is_empty() => excess.judge(found),
             (None, Some(enough)) if excess.is_any() => Outcome::Stopped { cost_above: enough },
             (found, enough) => {
-                let simulated = self.batch.outcome(params, if found.is_some() { None } else { enough });
+                let simulated = simulate(if found.is_some() { None } else { enough });
                 excess.judge(match (simulated, found) {
                     (Outcome::Simulated { .. }, Some(found)) => found,
                     _ => simulated,
@@ -349,14 +356,38 @@ impl<const N: usize> SimulatedObjective<'_, N> {
             }
         }
     }
+
+    fn answer<P: Parameters<N>>(&self, gains: &Gains, params: &P, enough: Option<Finite>) -> Outcome {
+        self.outcome(gains, params, enough, |enough| self.batch.outcome(params, enough))
+    }
+
+    fn verdict<P: Parameters<N>>(&self, gains: &Gains, params: &P) -> Verdict {
+        let mut plants = Vec::new();
+        let outcome = self.outcome(gains, params, None, |_| {
+            plants = self.batch.run(params);
+            self.batch.scoring.of_batch(plants.iter().map(|plant| plant.outcome))
+        });
+        Verdict { outcome, plants }
+    }
 }
 
 impl<const N: usize> Objective for SimulatedObjective<'_, N> {
     fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
         match Checked::new(gains, self.batch.task.step_s) {
             None => no_controller(),
-            Some(Checked::Aic(params)) => self.outcome(gains, &params, enough),
-            Some(Checked::Mrac(params)) => self.outcome(gains, &*params, enough),
+            Some(Checked::Aic(params)) => self.answer(gains, &params, enough),
+            Some(Checked::Mrac(params)) => self.answer(gains, &*params, enough),
+        }
+    }
+}
+
+/// The same outcome, with what each plant says; without plants when none had to be run.
+impl<const N: usize> Judge for SimulatedObjective<'_, N> {
+    fn judge(&self, gains: &Gains) -> Verdict {
+        match Checked::new(gains, self.batch.task.step_s) {
+            None => Verdict { outcome: no_controller(), plants: Vec::new() },
+            Some(Checked::Aic(params)) => self.verdict(gains, &params),
+            Some(Checked::Mrac(params)) => self.verdict(gains, &*params),
         }
     }
 }

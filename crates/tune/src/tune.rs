@@ -104,7 +104,8 @@ pub fn tune<C, R: Display>(
     let Bench { objective, judge, progress } = bench;
     progress.stage(Stage::Search);
     let mut run = search(space, start, &question.search, objective, progress)?;
-    let start = start.map(|_| 0);
+    // A search that nobody answers has not even evaluated its start.
+    let start = start.filter(|_| !run.evaluations.is_empty()).map(|_| 0);
     let (certification, winner) =
         certify_best(&mut run, space, objective, start, question.certification_attempts, progress, certify);
 

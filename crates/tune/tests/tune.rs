@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use certune_tune::{
-    Bench, Evaluation, Finite, Gains, Goals, Judge, Method, Outcome, Progress, Question, RunRecord, SearchSettings,
-    Space, Stage, TuneError, TuneProgress, Tuned, Verdict, tune,
+    Bench, Candidate, Evaluation, Finite, Gains, Goals, Judge, Method, Objective, Outcome, Progress, Question,
+    RunRecord, SearchSettings, Space, Stage, Termination, TuneError, TuneProgress, Tuned, Verdict, tune,
 };
 use common::{Numbers, ones as start, space_of};
 
@@ -98,6 +98,29 @@ fn the_best_certified_candidate_wins_over_better_refused_ones() {
     let better =
         |other: &&Evaluation| other.outcome.cost() < winner.outcome.cost() && other.gains.number("kappa_mu") < 2.0;
     assert!(tuned.record.evaluations.iter().find(better).is_none(), "a better candidate would have been certified");
+}
+
+/// Somebody who is not there.
+struct Nobody;
+
+impl Objective for Nobody {
+    fn evaluate(&self, _: &Gains, _: Option<Finite>) -> Outcome {
+        Outcome::Diverged { at_s: Finite::saturating(0.0) }
+    }
+
+    fn evaluate_all(&self, _: &[Candidate]) -> Option<Vec<Outcome>> {
+        None
+    }
+}
+
+#[test]
+fn a_run_that_nobody_answers_has_neither_start_nor_winner() {
+    let bench = Bench { objective: &Nobody, judge: &Held, progress: &() };
+    let certify = |_: &Gains| Ok::<_, &str>(());
+    let tuned = tune(question(Method::Schedule, 2), &space(), Some(&start()), bench, certify).expect("a record");
+    assert!(tuned.record.evaluations.is_empty() && tuned.certificate.is_none());
+    assert_eq!((tuned.record.start, tuned.record.winner), (None, None));
+    assert_eq!(tuned.record.termination, Termination::Interrupted);
 }
 
 #[test]

@@ -12,26 +12,27 @@
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, Write};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use certune::closed_loop::Scenario;
 use certune::dynamics::Robot;
 use certune::tune::filter::{DEFAULT_SAMPLES, StabilityFilter};
-use certune::tune::{Candidate, Finite, Gains, Objective, Outcome, SearchSettings, Termination, TuneError, search};
+use certune::tune::{
+    Candidate, Finite, Gains, Objective, Outcome, SearchSettings, Space, Termination, TuneError, search,
+};
 use serde::{Deserialize, Serialize};
 
-use super::tune::{DEFAULT_BUDGET, DEFAULT_SEED, inertia_kg_m2, started};
+use super::tune::{DEFAULT_BUDGET, DEFAULT_SEED, inertia_kg_m2, misfit, started};
 use crate::catalogue;
 use crate::cli::{AskTellArgs, Exit};
 use crate::error::Error;
+use crate::lines::{Lines, nobody_listens};
 use crate::sizes::for_joint_count;
 
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
 enum Said<'a> {
     Ask { id: usize, gains: &'a Gains },
-    Error { line: usize, message: String },
     Done { reason: &'static str, evaluations: usize, best: Option<Best<'a>> },
 }
 
@@ -74,44 +75,30 @@ impl Tell {
 
 /// The other side of the two streams.
 struct Talk<R, W> {
-    input: R,
-    output: W,
-    /// Lines read.
-    line: usize,
-    /// Candidates asked so far.
-    asked: usize,
+    lines: Lines<R, W>,
+    /// Everything asked for so far; a candidate's place is its id.
+    asked: Vec<Gains>,
     /// What a failure of the streams was.
-    broken: Option<std::io::Error>,
+    broken: Option<Error>,
 }
 
 impl<R: BufRead, W: Write> Talk<R, W> {
-    fn say(&mut self, said: &Said<'_>) -> std::io::Result<()> {
-        let text = serde_json::to_string(said)?;
-        writeln!(self.output, "{text}")?;
-        self.output.flush()
+    const fn new(lines: Lines<R, W>) -> Self {
+        Self { lines, asked: Vec::new(), broken: None }
     }
 
     /// Asks for all of `gains` and listens until each has its answer; none when the input has ended before.
-    fn answers(&mut self, gains: &[&Gains]) -> std::io::Result<Option<Vec<Outcome>>> {
-        let first = self.asked;
-        self.asked += gains.len();
+    fn answers(&mut self, gains: &[Gains]) -> Result<Option<Vec<Outcome>>, Error> {
+        let first = self.asked.len();
+        self.asked.extend_from_slice(gains);
         for (offset, gains) in gains.iter().enumerate() {
-            self.say(&Said::Ask { id: first + offset, gains })?;
+            self.lines.say(&Said::Ask { id: first + offset, gains })?;
         }
         let mut answers: BTreeMap<usize, Outcome> = BTreeMap::new();
-        let mut text = Vec::new();
         while answers.len() < gains.len() {
-            text.clear();
-            if self.input.read_until(b'\n', &mut text)? == 0 {
-                return Ok(None);
-            }
-            self.line += 1;
-            if text.iter().all(u8::is_ascii_whitespace) {
-                continue;
-            }
-            if let Err(message) = understood(&text, first..self.asked, &mut answers) {
-                let line = self.line;
-                self.say(&Said::Error { line, message })?;
+            let Some(text) = self.lines.hear()? else { return Ok(None) };
+            if let Err(message) = understood(text, first..self.asked.len(), &mut answers) {
+                self.lines.refuse(&message)?;
             }
         }
         Ok(Some(answers.into_values().collect()))
@@ -147,8 +134,6 @@ type Filter = Box<dyn Fn(&Gains) -> Option<Outcome> + Sync>;
 struct Told<R, W> {
     talk: Mutex<Talk<R, W>>,
     filter: Option<Filter>,
-    /// Candidates that the filter has kept from being asked for.
-    unstable: AtomicUsize,
 }
 
 impl<R: BufRead + Send, W: Write + Send> Objective for Told<R, W> {
@@ -162,9 +147,8 @@ impl<R: BufRead + Send, W: Write + Send> Objective for Told<R, W> {
             .iter()
             .map(|candidate| self.filter.as_ref().and_then(|filter| filter(&candidate.gains)))
             .collect();
-        self.unstable.fetch_add(outcomes.iter().flatten().count(), Ordering::Relaxed);
-        let open = || candidates.iter().zip(&outcomes).filter(|(_, found)| found.is_none());
-        let gains: Vec<&Gains> = open().map(|(candidate, _)| &candidate.gains).collect();
+        let open = candidates.iter().zip(&outcomes).filter(|(_, found)| found.is_none());
+        let gains: Vec<Gains> = open.map(|(candidate, _)| candidate.gains.clone()).collect();
         let mut talk = self.talk.lock().unwrap_or_else(PoisonError::into_inner);
         let answers = match talk.answers(&gains) {
             Ok(answers) => answers?,
@@ -182,7 +166,7 @@ impl<R: BufRead + Send, W: Write + Send> Objective for Told<R, W> {
 }
 
 pub fn run(args: &AskTellArgs) -> Result<Exit, Error> {
-    let (_, file) = catalogue::space(args.space.as_deref(), None)?;
+    let file = catalogue::space(args.space.as_deref(), None)?.space;
     let arm = match &args.robot {
         Some(name) => {
             let robot = catalogue::robot(name, args.tip.as_deref())?;
@@ -196,51 +180,43 @@ pub fn run(args: &AskTellArgs) -> Result<Exit, Error> {
     let budget = args.budget.unwrap_or(DEFAULT_BUDGET);
     let settings = SearchSettings::new(space.method(), budget, args.seed.unwrap_or(DEFAULT_SEED));
     let filter = arm.as_ref().map(|(_, robot, scenario)| filter(robot, scenario, settings.seed)).transpose()?;
-    let talk = Talk {
-        input: std::io::BufReader::new(std::io::stdin()),
-        output: std::io::stdout(),
-        line: 0,
-        asked: 0,
-        broken: None,
-    };
-    let told = Told { talk: Mutex::new(talk), filter, unstable: AtomicUsize::new(0) };
-    let found = search(&space, Some(&start), &settings, &told, &()).map_err(TuneError::from)?;
-    let mut talk = told.talk.into_inner().unwrap_or_else(PoisonError::into_inner);
-    if let Some(error) = talk.broken {
-        return if error.kind() == std::io::ErrorKind::BrokenPipe {
-            Ok(Exit::Unreadable)
-        } else {
-            Err(Error::Stdout(error))
-        };
+    match converse(Lines::standard(), filter, &space, &start, &settings) {
+        Err(error) if nobody_listens(&error) => Ok(Exit::Unreadable),
+        ended => ended,
     }
-    // Ids count the candidates that were asked for, not those that the filter kept back.
-    let asked = |index: usize| {
-        let before = &found.evaluations[..index];
-        before.iter().filter(|evaluation| !matches!(evaluation.outcome, Outcome::Unstable { .. })).count()
+}
+
+/// The whole search, from the first question to the last line.
+fn converse<R: BufRead + Send, W: Write + Send>(
+    lines: Lines<R, W>,
+    filter: Option<Filter>,
+    space: &Space,
+    start: &Gains,
+    settings: &SearchSettings,
+) -> Result<Exit, Error> {
+    let told = Told { talk: Mutex::new(Talk::new(lines)), filter };
+    let found = search(space, Some(start), settings, &told, &()).map_err(TuneError::from)?;
+    let Talk { mut lines, asked, broken } = told.talk.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if let Some(error) = broken {
+        return Err(error);
+    }
+    let best = found.ranked().first().and_then(|best| {
+        let id = asked.iter().position(|gains| *gains == best.gains)?;
+        Some(Best { id, score: best.outcome.cost()?, gains: &best.gains })
+    });
+    let (reason, exit) = match found.termination {
+        Termination::BudgetSpent => ("budget-spent", Exit::Holds),
+        Termination::Converged => ("converged", Exit::Holds),
+        Termination::Interrupted => ("input-ended", Exit::Unreadable),
     };
-    let best = found
-        .ranked()
-        .first()
-        .and_then(|best| Some(Best { id: asked(best.index), score: best.outcome.cost()?, gains: &best.gains }));
-    let interrupted = found.termination == Termination::Interrupted;
-    let reason = match found.termination {
-        Termination::BudgetSpent => "budget-spent",
-        Termination::Converged => "converged",
-        Termination::Interrupted => "input-ended",
-    };
-    talk.say(&Said::Done { reason, evaluations: found.evaluations.len(), best }).map_err(Error::Stdout)?;
-    Ok(if interrupted { Exit::Unreadable } else { Exit::Holds })
+    lines.say(&Said::Done { reason, evaluations: found.evaluations.len(), best })?;
+    Ok(exit)
 }
 
 /// The eigenvalues of the robot's linearised loops, before anybody is asked.
 fn filter(robot: &Robot, scenario: &Scenario, seed: u64) -> Result<Filter, Error> {
     for_joint_count!(robot.joints(), N => {
-        let misfit = |source| Error::ScenarioFit {
-            scenario: scenario.name.clone(),
-            robot: robot.name().to_owned(),
-            source: Box::new(source),
-        };
-        let task = scenario.bind::<N>(robot).map_err(misfit)?;
+        let task = scenario.bind::<N>(robot).map_err(|error| misfit(robot, scenario, error.into()))?;
         let filter = StabilityFilter::<N>::new(robot, scenario, &task, seed, DEFAULT_SAMPLES)?;
         let step_s = task.step_s;
         let rejected = move |gains: &Gains| {
@@ -253,48 +229,4 @@ fn filter(robot: &Robot, scenario: &Scenario, seed: u64) -> Result<Filter, Error
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use certune::closed_loop::AicTable;
-
-    fn talk(input: &str) -> (Talk<&[u8], Vec<u8>>, Gains) {
-        let gains = AicTable::uniform(1.0).into();
-        (Talk { input: input.as_bytes(), output: Vec::new(), line: 0, asked: 0, broken: None }, gains)
-    }
-
-    #[test]
-    fn answers_come_in_any_order_and_bad_lines_lose_nothing() {
-        let lines = [
-            "{\"tell\":{\"id\":1,\"failed\":true}}",
-            "",
-            "not json",
-            "{\"tell\":{\"id\":7,\"score\":1}}",
-            "{\"tell\":{\"id\":0}}",
-            "{\"tell\":{\"id\":0,\"score\":NaN}}",
-            "{\"tell\":{\"id\":0,\"score\":1e999}}",
-            "{\"tell\":{\"id\":1,\"score\":3}}",
-            "{\"tell\":{\"id\":0,\"score\":2.5,\"colour\":1}}",
-            "{\"tell\":{\"id\":0,\"score\":2.5}}",
-        ];
-        let text = lines.join("\n");
-        let (mut talk, gains) = talk(&text);
-        let answers = talk.answers(&[&gains, &gains]).unwrap().unwrap();
-        let expected = [
-            Outcome::Simulated { cost: Finite::new(2.5).unwrap() },
-            Outcome::Diverged { at_s: Finite::saturating(0.0) },
-        ];
-        assert_eq!(answers, expected);
-        let said = String::from_utf8(talk.output).unwrap();
-        let errors: Vec<&str> = said.lines().filter(|line| line.contains("\"error\"")).collect();
-        assert_eq!(errors.len(), 7, "{said}");
-        for (line, number) in errors.iter().zip([3, 4, 5, 6, 7, 8, 9]) {
-            assert!(line.contains(&format!("\"line\":{number},")), "{line}");
-        }
-    }
-
-    #[test]
-    fn an_input_that_ends_leaves_no_answer() {
-        let (mut talk, gains) = talk("{\"tell\":{\"id\":0,\"score\":1}}\n");
-        assert_eq!(talk.answers(&[&gains, &gains]).unwrap(), None);
-    }
-}
+mod tests;

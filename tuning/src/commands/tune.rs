@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use certune::certify::FamilyValues;
 use certune::closed_loop::Scenario;
@@ -10,18 +11,20 @@ use certune::dynamics::{Joints, Model, Robot, mass_matrix};
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::{
     Batch, BatchError, Bench, Evaluation, Gains, Goal, Goals, HeldOut, Outcome, Question, RunRecord, SearchError,
-    SearchSettings, Setting, SimulatedObjective, Source, Space, SpaceFile, TuneError, Tuned, tune,
+    SearchSettings, Setting, SimulatedObjective, Source, Space, SpaceFile, Termination, TuneError, Tuned, tune,
 };
 use certune::verify::{Certificate, Claim, Record, Verdict};
 use certune::{ArmCertifier, Growth, Over, StabilityError, family_of};
 use serde::Serialize;
 
 use super::claims::{ClaimSummary, claims_in_words, growths, summaries};
-use crate::catalogue::{self, GainsSource, default_preset};
+use crate::catalogue::{self, GainsSource, SpaceSource, default_preset};
 use crate::cli::{Context, ControllerName, Exit, TuneArgs};
 use crate::error::Error;
-use crate::output::{self, number, table};
-use crate::page::{self, Spread, percent_of_tail, spread};
+use crate::interrupt::flag_of_ctrl_c;
+use crate::journal::{Header, Journal, Journalled};
+use crate::output::{self, table};
+use crate::page::{self, FIGURES, Spread, percent_of_tail, spread};
 use crate::progress::{Terminal, achieved};
 use crate::promise;
 use crate::run::{Folder, Run, RunFile};
@@ -31,32 +34,29 @@ use crate::versions::versions;
 pub const DEFAULT_BUDGET: usize = 300;
 pub const DEFAULT_SEED: u64 = 1;
 /// Plants on which every candidate is simulated.
-const DEFAULT_PLANTS: usize = 8;
+pub const DEFAULT_PLANTS: usize = 8;
 /// Plants that judge start and winner.
 const HELD_OUT_PLANTS: usize = 200;
 /// Candidates brought before the certifier at most.
 const ATTEMPTS: usize = 12;
 
 /// Everything a run needs, found before anything is computed.
-struct Plan {
-    robot: Robot,
-    /// How the robot was named on the command line.
-    robot_argument: String,
-    scenario: Scenario,
-    family: FamilyValues,
-    records: Vec<Record>,
-    space: Space,
-    start: Gains,
-    question: Question,
-    folder: Folder,
-    preset: String,
-    space_name: String,
+pub struct Plan {
+    pub robot: Robot,
+    pub family: FamilyValues,
+    pub records: Vec<Record>,
+    pub space: Space,
+    /// What is asked, as the journal holds it.
+    pub header: Header,
+    pub folder: Folder,
 }
 
 #[derive(Debug, Serialize)]
 struct Summary<'a> {
     directory: String,
     certified: bool,
+    /// Ended by Ctrl-C; `autotune resume` goes on.
+    interrupted: bool,
     files: Vec<String>,
     gains: Option<&'a Gains>,
     held_out: Compared,
@@ -74,31 +74,42 @@ struct Compared {
 
 pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
     let plan = plan(args)?;
-    let threads = args.threads.unwrap_or(0);
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|source| Error::Threads { threads, source })?;
     let existed = plan.folder.path.exists();
     output::prepare_folder(&plan.folder.path)?;
-    let progress = Terminal::new(context.verbose).after(plan.question.goals.objective);
-    let outcome = pool.install(|| {
-        for_joint_count!(plan.robot.joints(), N => tune_arm::<N>(&plan, &progress))
-            .unwrap_or_else(|| Err(catalogue::too_many_joints(&plan.robot)))
-    });
-    progress.finish();
+    let outcome =
+        Journal::begin(&plan.folder, &plan.header).and_then(|journal| carry_out(&plan, journal, args.threads, context));
     if outcome.is_err() && !existed {
         // Only a folder that is empty goes; what keeps it from going is no part of the message.
         let _ = std::fs::remove_dir(&plan.folder.path);
     }
-    let (run, page, growth) = outcome?;
-    let files = plan.folder.write(&run, &page)?;
+    outcome
+}
+
+/// Does what is planned and not in the journal yet.
+pub fn carry_out(plan: &Plan, mut journal: Journal, threads: Option<usize>, context: Context) -> Result<Exit, Error> {
+    let question = &plan.header.question;
+    let progress = Terminal::new(context.verbose).after(question.goals.objective);
+    let outcome = tune_on(plan, &mut journal, threads.unwrap_or(0), &progress);
+    progress.finish();
+    let (run, page, growth) = match outcome {
+        Ok(found) => found,
+        Err(error) => {
+            journal.fail(&error)?;
+            return Err(error);
+        }
+    };
+    let files = plan.folder.write(&run, &page).map_err(|error| journal.without_results(error))?;
+    let interrupted = run.file.record.termination == Termination::Interrupted;
+    if !interrupted {
+        journal.finish()?;
+    }
     let certified = run.file.record.winner.is_some();
     if context.json {
         let HeldOut { start, tuned } = &run.file.record.held_out;
         output::print_json(&Summary {
             directory: plan.folder.path.display().to_string(),
             certified,
+            interrupted,
             files: files.iter().map(|path| path.display().to_string()).collect(),
             gains: run.file.record.tuned(),
             held_out: Compared { published: start.as_ref().map(spread), tuned: tuned.as_ref().map(spread) },
@@ -107,7 +118,16 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
             elapsed_s: progress.elapsed_s(),
         })?;
     } else {
-        output::print(&in_words(&plan, &run, &growth, &files, progress.elapsed_s()))?;
+        output::print(&in_words(plan, &run, &growth, &files, progress.elapsed_s()))?;
+    }
+    if interrupted {
+        output::say(&format!(
+            "interrupted after {} of {} candidates\n  try: `autotune resume {}` to go on",
+            run.file.record.evaluations.len(),
+            question.search.evaluations,
+            plan.folder.path.display()
+        ));
+        return Ok(Exit::Interrupted);
     }
     Ok(if certified { Exit::Holds } else { Exit::NotCertified })
 }
@@ -119,9 +139,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     }
     let robot = catalogue::robot(&args.robot, args.tip.as_deref())?;
     let scenario = catalogue::scenario(args.scenario.as_deref(), &robot)?;
-    let family = family_of(&scenario.plant_box)?;
-    let records = catalogue::records(&[])?;
-    let (space_name, file) = catalogue::space(args.space.as_deref(), args.controller)?;
+    let SpaceSource { name: space_name, text, space: file } = catalogue::space(args.space.as_deref(), args.controller)?;
     let controller = file.controller();
     let inertia_kg_m2 = inertia_kg_m2(&robot, &scenario)?;
     let (preset, space, start) = started(&file, Some(&inertia_kg_m2))?;
@@ -131,31 +149,38 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     }
     let seed = args.seed.unwrap_or(DEFAULT_SEED);
     let path = args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(run_name(&robot, controller, seed)));
+    let question = Question {
+        robot: robot.name().to_owned(),
+        robot_sha256: robot.sha256(),
+        scenario: scenario.name.clone(),
+        versions: versions(),
+        goals,
+        search: SearchSettings::new(space.method(), budget, seed),
+        batch_plants: args.plants.unwrap_or(DEFAULT_PLANTS),
+        held_out_plants: HELD_OUT_PLANTS,
+        certification_attempts: ATTEMPTS,
+    };
     Ok(Plan {
-        question: Question {
-            robot: robot.name().to_owned(),
-            robot_sha256: robot.sha256(),
-            scenario: scenario.name.clone(),
-            versions: versions(),
-            goals,
-            search: SearchSettings::new(space.method(), budget, seed),
-            batch_plants: args.plants.unwrap_or(DEFAULT_PLANTS),
-            held_out_plants: HELD_OUT_PLANTS,
-            certification_attempts: ATTEMPTS,
+        family: family_of(&scenario.plant_box)?,
+        records: catalogue::records(&[])?,
+        header: Header {
+            robot_file: catalogue::robot_file(&args.robot)?,
+            robot: args.robot.clone(),
+            tip: args.tip.clone(),
+            controller: controller.to_owned(),
+            scenario,
+            space_name,
+            space: text,
+            // A path is the machine's business; the record holds the file's name.
+            preset: Path::new(&preset)
+                .file_name()
+                .map_or_else(|| preset.clone(), |name| name.to_string_lossy().into_owned()),
+            start,
+            question,
         },
-        robot_argument: args.robot.clone(),
         robot,
-        scenario,
-        family,
-        records,
         space,
-        start,
         folder: Folder { path },
-        // A path is the machine's business; the record holds the file's name.
-        preset: Path::new(&preset)
-            .file_name()
-            .map_or_else(|| preset.clone(), |name| name.to_string_lossy().into_owned()),
-        space_name,
     })
 }
 
@@ -186,18 +211,44 @@ fn run_name(robot: &Robot, controller: &str, seed: u64) -> String {
     format!("{}-{controller}-{seed}", if name.is_empty() { "robot" } else { &name })
 }
 
-/// The run and its page.
-fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, String, Vec<Growths>), Error> {
-    let Plan { robot, scenario, question, .. } = plan;
-    let seed = question.search.seed;
-    let misfit = |error| match error {
+/// What does not fit, in terms of the files.
+pub fn misfit(robot: &Robot, scenario: &Scenario, error: BatchError) -> Error {
+    match error {
         BatchError::Task(source) => Error::ScenarioFit {
             scenario: scenario.name.clone(),
             robot: robot.name().to_owned(),
             source: Box::new(source),
         },
         BatchError::NoPlants | BatchError::Plant(_) => Error::Batch(error),
-    };
+    }
+}
+
+/// A run, its page, and the growth that each claim speaks of.
+type Made = (Run, String, Vec<Growths>);
+
+fn tune_on(plan: &Plan, journal: &mut Journal, threads: usize, progress: &Terminal) -> Result<Made, Error> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|source| Error::Threads { threads, source })?;
+    let stop = flag_of_ctrl_c()?;
+    pool.install(|| {
+        for_joint_count!(plan.robot.joints(), N => tune_arm::<N>(plan, journal, &stop, progress))
+            .unwrap_or_else(|| Err(catalogue::too_many_joints(&plan.robot)))
+    })
+}
+
+/// The run and its page.
+fn tune_arm<const N: usize>(
+    plan: &Plan,
+    journal: &mut Journal,
+    stop: &AtomicBool,
+    progress: &Terminal,
+) -> Result<Made, Error> {
+    let Plan { robot, header, .. } = plan;
+    let Header { scenario, question, start, .. } = header;
+    let seed = question.search.seed;
+    let misfit = |error| misfit(robot, scenario, error);
     let judge = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants).map_err(misfit)?;
     let certifier = ArmCertifier::<N>::new(robot, &plan.family)?.with_records(&plan.records, &Over::AllAngles)?;
     if certifier.record().is_none() {
@@ -206,11 +257,12 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
     }
     let objective =
         SimulatedObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
-    let goals = objective.batch().resolved(question.goals.clone(), &plan.start);
-    let objective = objective.with_goals(&goals, &certifier).hardest_first(&plan.start);
+    let goals = objective.batch().resolved(question.goals.clone(), start);
+    let objective = objective.with_goals(&goals, &certifier).hardest_first(start);
     let judge = judge.with_goals(&goals.for_comparison());
     let question = Question { goals, ..question.clone() };
-    let bench = Bench { objective: &objective, judge: &judge, progress };
+    let journalled = Journalled::new(&objective, journal, stop);
+    let bench = Bench { objective: &journalled, judge: &judge, progress };
     let mut first_refusal: Option<Vec<Certificate>> = None;
     let mut failure: Option<StabilityError> = None;
     let certify = |gains: &Gains| match promise::certify(&certifier, scenario, gains) {
@@ -227,20 +279,21 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
             Err(reason)
         }
     };
-    let Tuned { record, certificate } = tune(question, &plan.space, Some(&plan.start), bench, certify)?;
+    let Tuned { record, certificate } = tune(question, &plan.space, Some(start), bench, certify)?;
+    journalled.failure()?;
     if let Some(error) = failure {
         return Err(error.into());
     }
     let file = RunFile {
-        controller: plan.start.controller().to_owned(),
-        preset: plan.preset.clone(),
-        space_name: plan.space_name.clone(),
+        controller: header.controller.clone(),
+        preset: header.preset.clone(),
+        space_name: header.space_name.clone(),
         scenario: scenario.clone(),
         record,
     };
     let run = Run { file, certificates: certificate.or(first_refusal).unwrap_or_default() };
     progress.begin("writing the report");
-    let page = page::page::<N>(&run, robot, &plan.robot_argument, &plan.folder)?;
+    let page = page::page::<N>(&run, robot, &header.robot, &plan.folder)?;
     let growth = run.certificates.iter().map(|certificate| growths::<N>(robot, certificate));
     let growth = growth.collect::<Result<_, _>>()?;
     Ok((run, page, growth))
@@ -356,25 +409,18 @@ fn in_words(plan: &Plan, run: &Run, growth: &[Growths], files: &[PathBuf], elaps
     }
     let HeldOut { start, tuned } = &record.held_out;
     let [published, tuned] = [start, tuned].map(|verdict| verdict.as_ref().map(spread));
-    let row = |name: &str, digits: usize, scale: f64, value: fn(&Spread) -> Option<f64>| {
-        let cell = |spread: &Option<Spread>| number(spread.as_ref().and_then(value).map(|value| scale * value), digits);
-        vec![name.to_owned(), cell(&published), cell(&tuned)]
-    };
-    let unit = question.goals.for_comparison().objective.cost_unit();
-    let rows = [
-        row(&format!("cost, worst {} % of the plants, {unit}", percent_of_tail(&question.goals)), 4, 1.0, |spread| {
-            spread.cost_s
-        }),
-        row(&format!("cost, worst plant, {unit}"), 4, 1.0, |spread| spread.worst_cost_s),
-        row("slowest move settles in, s", 3, 1.0, |spread| spread.settling_time_s),
-        row("largest final error, mrad", 3, 1e3, |spread| spread.final_error_rad),
-        row("largest overshoot, %", 2, 1e2, |spread| spread.overshoot),
-        row("largest torque, N m", 2, 1.0, |spread| spread.peak_torque_n_m),
-        row("largest torque rate RMS, N m/s", 1, 1.0, |spread| spread.torque_rate_rms_n_m_per_s),
-    ];
+    let figures = [published, tuned];
     let held_out = format!("{} held-out plants", question.held_out_plants);
     let header = [held_out.as_str(), &run.file.preset, "tuned"];
-    text.push_str(&table(&header, &rows));
+    text.push_str(&table(&header, &FIGURES.map(|figure| figure.row(&figures))));
+    let judged = question.goals.for_comparison();
+    let _ = writeln!(
+        text,
+        "cost: {}, {}; tail: the mean over the worst {} % of the plants",
+        judged.objective.name().replace('-', " "),
+        judged.objective.cost_unit(),
+        percent_of_tail(&question.goals)
+    );
     if let Some(kept) = limits_kept(record) {
         text.push_str(&output::wrapped(&kept, 0));
     }

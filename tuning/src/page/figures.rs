@@ -3,6 +3,8 @@
 use certune::tune::{Figures, Outcome, PlantResult, Verdict};
 use serde::Serialize;
 
+use crate::output::number;
+
 /// The worst of each figure over the plants; a figure that a plant does not have is missing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spread {
@@ -16,6 +18,41 @@ pub struct Spread {
     pub torque_rate_rms_n_m_per_s: Option<f64>,
     pub plants: usize,
     pub diverged: usize,
+}
+
+/// A row of a table of figures.
+pub struct Figure {
+    name: &'static str,
+    digits: usize,
+    /// From SI to the unit of the name.
+    scale: f64,
+    value: fn(&Spread) -> Option<f64>,
+}
+
+/// The rows, in the order of a table.
+pub const FIGURES: [Figure; 7] = [
+    Figure { name: "cost, tail of the plants", digits: 4, scale: 1.0, value: |spread| spread.cost_s },
+    Figure { name: "cost, worst plant", digits: 4, scale: 1.0, value: |spread| spread.worst_cost_s },
+    Figure { name: "slowest move settles in, s", digits: 3, scale: 1.0, value: |spread| spread.settling_time_s },
+    Figure { name: "largest final error, mrad", digits: 3, scale: 1e3, value: |spread| spread.final_error_rad },
+    Figure { name: "largest overshoot, %", digits: 2, scale: 1e2, value: |spread| spread.overshoot },
+    Figure { name: "largest torque, N m", digits: 2, scale: 1.0, value: |spread| spread.peak_torque_n_m },
+    Figure {
+        name: "largest torque rate RMS, N m/s",
+        digits: 1,
+        scale: 1.0,
+        value: |spread| spread.torque_rate_rms_n_m_per_s,
+    },
+];
+
+impl Figure {
+    /// The figure's name, and its value for each set of gains.
+    pub fn row(&self, spreads: &[Option<Spread>]) -> Vec<String> {
+        let cell = |spread: &Option<Spread>| {
+            number(spread.as_ref().and_then(self.value).map(|value| self.scale * value), self.digits)
+        };
+        std::iter::once(self.name.to_owned()).chain(spreads.iter().map(cell)).collect()
+    }
 }
 
 /// The figures of a verdict.

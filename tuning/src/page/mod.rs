@@ -13,14 +13,14 @@ use certune::report::{
     Asked, CommandLine, CostMeaning, Evaluation, GainRow, Pair, RangeRow, SearchBounds, SearchRecord, SensitivityRow,
     TuningReport, Version, tuning_report,
 };
-use certune::tune::{Goal, Goals, Outcome, Phase, RunRecord, Scale, Source};
+use certune::tune::{Goal, Goals, Outcome, Phase, RunRecord, Scale, Source, Termination};
 
 use crate::catalogue;
 use crate::error::Error;
 use crate::promise;
 use crate::run::{Folder, Run};
 
-pub use figures::{Spread, spread};
+pub use figures::{FIGURES, Spread, spread};
 
 /// Two values this close, as a fraction of the range, are called the same.
 const ON_BOUND: f64 = 0.005;
@@ -351,6 +351,13 @@ fn method(run: &Run, certified: bool) -> Vec<String> {
             plants.payload_kg, plants.friction_n_m_s_per_rad, plants.rotor_inertia_kg_m2
         ),
     ];
+    if record.termination == Termination::Interrupted {
+        let budget = question.search.evaluations;
+        paragraphs.insert(
+            0,
+            format!("The search was interrupted before it had looked at the {budget} candidates that were asked for."),
+        );
+    }
     if !certified {
         paragraphs.insert(
             0,

@@ -1,6 +1,6 @@
 //! What each command prints, and its exit code, when nothing is wrong.
 
-use crate::common::{autotune, json, stdout, urdf};
+use crate::common::{TWO_LINKS, autotune, json, stdout, urdf};
 use certune::verify::{Document, Record};
 use serde_json::Value;
 
@@ -214,17 +214,6 @@ fn lists_name_what_is_built_in() {
         assert!(entries.iter().all(|entry| !entry["description"].as_str().unwrap().is_empty()));
     }
 }
-
-/// Two links in a plane.
-const TWO_LINKS: &str = r#"<robot name="two-links"><link name="base"/>
-<link name="upper"><inertial><mass value="2"/><origin xyz="0.15 0 0"/>
-<inertia ixx="0.002" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.02"/></inertial></link>
-<link name="lower"><inertial><mass value="1"/><origin xyz="0.1 0 0"/>
-<inertia ixx="0.001" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
-<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><origin rpy="1.5707963 0 0"/><axis xyz="0 0 1"/>
-<limit lower="-2" upper="2" effort="60" velocity="2"/></joint>
-<joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/><origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>
-<limit lower="-2" upper="2" effort="30" velocity="2"/></joint></robot>"#;
 
 /// A record that holds what `document` says of its arm, without the proofs that would make it follow.
 fn unproved_record(document: &Document) -> Record {

@@ -6,4 +6,6 @@ mod ask_tell;
 mod bad_input;
 mod commands;
 mod common;
+mod evaluate;
+mod resume;
 mod tune;
