@@ -61,6 +61,9 @@ pub enum Error {
     /// Gains that a search cannot start from.
     #[error("gains `{gains}`: {source}")]
     NotShared { gains: String, source: NotShared },
+    /// A run that would have nothing to be compared with.
+    #[error("search space `{space}` says start = \"cold\", but a run is reported beside the gains that it starts from")]
+    ColdStart { space: String },
     /// A controller that the command does not cover.
     #[error("`{command}` does not cover model reference adaptive control (mrac) yet")]
     Mrac { command: &'static str },
@@ -145,6 +148,10 @@ impl Error {
             Self::NotShared { .. } => {
                 Some("a preset with the same gains on every joint, see `autotune presets`".to_owned())
             }
+            Self::ColdStart { .. } => Some(
+                "a preset as [search] start, see `autotune presets`; `autotune ask-tell` searches from no gains"
+                    .to_owned(),
+            ),
             Self::Mrac { .. } => {
                 Some("`autotune simulate` runs mrac gains; use aic gains here, see `autotune presets`".to_owned())
             }

@@ -19,9 +19,7 @@ use certune::closed_loop::Scenario;
 use certune::control::aic::AicParams;
 use certune::dynamics::Robot;
 use certune::tune::filter::{DEFAULT_SAMPLES, StabilityFilter};
-use certune::tune::{
-    Candidate, Finite, Gains, Objective, Outcome, SearchError, SearchSettings, Termination, TuneError, search,
-};
+use certune::tune::{Candidate, Finite, Gains, Objective, Outcome, SearchSettings, Termination, TuneError, search};
 use serde::{Deserialize, Serialize};
 
 use super::tune::{DEFAULT_BUDGET, DEFAULT_SEED, start_of};
@@ -186,8 +184,7 @@ impl<R: BufRead + Send, W: Write + Send> Objective for Told<R, W> {
 
 pub fn run(args: &AskTellArgs) -> Result<Exit, Error> {
     let (_, space) = catalogue::space(args.space.as_deref())?;
-    let (_, start) = start_of(&space)?;
-    space.admit(&start).map_err(|error| TuneError::from(SearchError::Start(error)))?;
+    let start = start_of(&space)?.map(|(_, start)| start);
     let budget = args.budget.unwrap_or(DEFAULT_BUDGET);
     let settings = SearchSettings::new(space.method(), budget, args.seed.unwrap_or(DEFAULT_SEED));
     let filter = match &args.robot {
@@ -205,7 +202,7 @@ pub fn run(args: &AskTellArgs) -> Result<Exit, Error> {
         broken: None,
     };
     let told = Told { talk: Mutex::new(talk), filter, unstable: AtomicUsize::new(0) };
-    let found = search(&space, Some(&start), &settings, &told, &()).map_err(TuneError::from)?;
+    let found = search(&space, start.as_ref(), &settings, &told, &()).map_err(TuneError::from)?;
     let mut talk = told.talk.into_inner().unwrap_or_else(PoisonError::into_inner);
     if let Some(error) = talk.broken {
         return if error.kind() == std::io::ErrorKind::BrokenPipe {

@@ -125,7 +125,8 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     let family = family_of(&scenario.plant_box)?;
     let records = catalogue::records(&[])?;
     let (space_name, space) = catalogue::space(args.space.as_deref())?;
-    let (preset, start) = start_of(&space)?;
+    // A run is judged and reported beside the gains that it started from.
+    let (preset, start) = start_of(&space)?.ok_or_else(|| Error::ColdStart { space: space_name.clone() })?;
     // A start outside the space is refused before anything is computed.
     space.admit(&start).map_err(|error| TuneError::from(SearchError::Start(error)))?;
     let seed = args.seed.unwrap_or(DEFAULT_SEED);
@@ -158,13 +159,16 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     })
 }
 
-/// Where a search of `space` begins: the name of the gains, and the gains.
-pub fn start_of(space: &Space) -> Result<(String, Gains), Error> {
+/// Where a search of `space` begins: the name of the gains, and the gains; none for a cold start.
+pub fn start_of(space: &Space) -> Result<Option<(String, Gains)>, Error> {
+    if space.is_cold() {
+        return Ok(None);
+    }
     let preset = space.start().unwrap_or(DEFAULT_PRESET).to_owned();
     let source = GainsSource::find(&preset)?;
     let start =
         Gains::from_table(source.aic("tune")?).map_err(|source| Error::NotShared { gains: preset.clone(), source })?;
-    Ok((preset, start))
+    Ok(Some((preset, start)))
 }
 
 /// `panda-aic-1`; a URDF may name its robot with anything, a folder may not.

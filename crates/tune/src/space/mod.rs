@@ -19,7 +19,7 @@
 //!
 //! [search]
 //! method = "schedule"                 # or "cma-es", "nelder-mead", "particle-swarm"
-//! start = "pezzato2020-simulation"    # optional: a preset
+//! start = "pezzato2020-simulation"    # optional: a preset, or "cold", no gains at all
 //! objective = "settling-cost"         # optional: or "certified-rate", "certified-radius"
 //!
 //! [fixed]
@@ -56,6 +56,9 @@ use crate::gains::{Gain, Gains};
 
 /// The version of the file that this crate reads.
 pub const SPACE_SCHEMA: i64 = 1;
+
+/// What `start` says when there are no gains to start from.
+const COLD: &str = "cold";
 
 /// Significant decimal digits of a gain that the search proposes.
 const DIGITS: usize = 5;
@@ -408,9 +411,14 @@ impl Space {
         self.objective
     }
 
-    /// The name of the preset at which the search starts.
+    /// The name of the preset at which the search starts; none when the file names none, or starts cold.
     pub fn start(&self) -> Option<&str> {
-        self.start.as_deref()
+        self.start.as_deref().filter(|start| *start != COLD)
+    }
+
+    /// Whether the search starts from no gains: the file says `start = "cold"`.
+    pub fn is_cold(&self) -> bool {
+        self.start.as_deref() == Some(COLD)
     }
 
     /// Fixed value or range of `gain`.

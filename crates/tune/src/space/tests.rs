@@ -41,6 +41,15 @@ fn the_shipped_space_has_five_degrees_of_freedom_and_holds_the_published_gains()
 }
 
 #[test]
+fn a_cold_start_is_no_preset() {
+    let from = |start: &str| edited("start = \"pezzato2020-simulation\"\n", start).unwrap();
+    let (cold, preset, silent) = (from("start = \"cold\"\n"), shipped(), from(""));
+    assert_eq!((cold.is_cold(), cold.start()), (true, None));
+    assert_eq!((preset.is_cold(), preset.start()), (false, Some("pezzato2020-simulation")));
+    assert_eq!((silent.is_cold(), silent.start()), (false, None));
+}
+
+#[test]
 fn every_corner_of_the_shipped_space_is_slow_enough_for_euler_at_1_khz() {
     let space = shipped();
     let upper = |gain| match space.freedom(gain) {
