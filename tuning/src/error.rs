@@ -66,6 +66,9 @@ pub enum Error {
     /// A figure that the controller's claims do not have.
     #[error("{goal} is no goal of a search for gains of `mrac`: no claim about it has this figure")]
     NoFigure { goal: Goal },
+    /// A run that would have nothing to be compared with.
+    #[error("search space `{space}` says start = \"cold\", but a run is reported beside the gains that it starts from")]
+    ColdStart { space: String },
     /// A list on the command line that does not fit the robot.
     #[error("{flag} has {found} numbers, but robot `{robot}` has {joints} joints")]
     ListLength { flag: &'static str, found: usize, robot: String, joints: usize },
@@ -155,6 +158,10 @@ impl Error {
             ),
             Self::OtherController { found, .. } => Some(format!("--controller {found}, or another --space")),
             Self::NoFigure { .. } => Some("another --objective or limit, or --controller aic".to_owned()),
+            Self::ColdStart { .. } => Some(
+                "a preset as [search] start, see `autotune presets`; `autotune ask-tell` searches from no gains"
+                    .to_owned(),
+            ),
             Self::ListLength { joints, .. } => Some(format!("{joints} numbers separated by commas, base to tip")),
             Self::Stability(StabilityError::NoTorqueLimit { .. }) => {
                 Some("--torque-limits with a number, or an `effort` for every joint in the URDF file".to_owned())

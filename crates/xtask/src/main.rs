@@ -5,6 +5,9 @@
 //! | `cargo xtask ci` | every check, in the order in which a failure is cheapest to learn |
 //! | `cargo xtask golden` | writes the golden data again from Pinocchio (needs `pip install pin example-robot-data`) |
 //! | `cargo xtask peers` | sets up Pinocchio, MuJoCo and cvxpy from PyPI, and measures them and ours in turn: tables |
+//! | `cargo xtask peers tuners` | our search beside pycma, Optuna, SciPy and Nevergrad on a cheap objective: a table |
+//! | `cargo xtask peers panda` | the same on the Panda's objective |
+//! | `cargo xtask peers search` | our CMA-ES beside pycma on classic functions: a table |
 //! | `cargo xtask claims` | writes the certificates in `proofs/certificates/` again, and the list of them in `proofs/README.md` |
 #![forbid(unsafe_code)]
 
@@ -25,7 +28,10 @@ fn main() -> ExitCode {
         ["golden"] => golden(),
         ["claims"] => claims(),
         ["peers"] => peers::peers(),
-        _ => Err("usage: cargo xtask ci | golden | claims | peers".to_owned()),
+        ["peers", "tuners"] => peers::compare("tuners.py"),
+        ["peers", "panda"] => peers::compare("panda_tuners.py"),
+        ["peers", "search"] => peers::search(),
+        _ => Err("usage: cargo xtask ci | golden | claims | peers [tuners | panda | search]".to_owned()),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -22,7 +22,7 @@ use certune::tune::{
 };
 use serde::{Deserialize, Serialize};
 
-use super::tune::{DEFAULT_BUDGET, DEFAULT_SEED, inertia_kg_m2, misfit, started};
+use super::tune::{DEFAULT_BUDGET, DEFAULT_SEED, begun, inertia_kg_m2, misfit};
 use crate::catalogue;
 use crate::cli::{AskTellArgs, Exit};
 use crate::error::Error;
@@ -176,11 +176,12 @@ pub fn run(args: &AskTellArgs) -> Result<Exit, Error> {
         None => None,
     };
     let inertia_kg_m2 = arm.as_ref().map(|(inertia_kg_m2, ..)| inertia_kg_m2.as_slice());
-    let (_, space, start) = started(&file, inertia_kg_m2)?;
+    let (space, start) = begun(&file, inertia_kg_m2)?;
+    let start = start.map(|(_, start)| start);
     let budget = args.budget.unwrap_or(DEFAULT_BUDGET);
     let settings = SearchSettings::new(space.method(), budget, args.seed.unwrap_or(DEFAULT_SEED));
     let filter = arm.as_ref().map(|(_, robot, scenario)| filter(robot, scenario, settings.seed)).transpose()?;
-    match converse(Lines::standard(), filter, &space, &start, &settings) {
+    match converse(Lines::standard(), filter, &space, start.as_ref(), &settings) {
         Err(error) if nobody_listens(&error) => Ok(Exit::Unreadable),
         ended => ended,
     }
@@ -191,11 +192,11 @@ fn converse<R: BufRead + Send, W: Write + Send>(
     lines: Lines<R, W>,
     filter: Option<Filter>,
     space: &Space,
-    start: &Gains,
+    start: Option<&Gains>,
     settings: &SearchSettings,
 ) -> Result<Exit, Error> {
     let told = Told { talk: Mutex::new(Talk::new(lines)), filter };
-    let found = search(space, Some(start), settings, &told, &()).map_err(TuneError::from)?;
+    let found = search(space, start, settings, &told, &()).map_err(TuneError::from)?;
     let Talk { mut lines, asked, broken } = told.talk.into_inner().unwrap_or_else(PoisonError::into_inner);
     if let Some(error) = broken {
         return Err(error);

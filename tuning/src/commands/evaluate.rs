@@ -50,8 +50,8 @@ impl Found {
 pub fn run(args: &EvaluateArgs) -> Result<Exit, Error> {
     let robot = catalogue::robot(&args.robot.robot, args.robot.tip.as_deref())?;
     let scenario = catalogue::scenario(args.scenario.as_deref(), &robot)?;
-    let file = catalogue::space(args.space.as_deref(), None)?.space;
-    let (_, space, start) = started(&file, Some(&inertia_kg_m2(&robot, &scenario)?))?;
+    let source = catalogue::space(args.space.as_deref(), None)?;
+    let (_, space, start) = started(&source, Some(&inertia_kg_m2(&robot, &scenario)?))?;
     let (seed, plants) = (args.seed.unwrap_or(DEFAULT_SEED), args.plants.unwrap_or(DEFAULT_PLANTS));
     let family = family_of(&scenario.plant_box)?;
     let records = catalogue::records(&[])?;

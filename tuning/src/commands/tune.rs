@@ -139,10 +139,12 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     }
     let robot = catalogue::robot(&args.robot, args.tip.as_deref())?;
     let scenario = catalogue::scenario(args.scenario.as_deref(), &robot)?;
-    let SpaceSource { name: space_name, text, space: file } = catalogue::space(args.space.as_deref(), args.controller)?;
-    let controller = file.controller();
+    let source = catalogue::space(args.space.as_deref(), args.controller)?;
+    let controller = source.space.controller();
     let inertia_kg_m2 = inertia_kg_m2(&robot, &scenario)?;
-    let (preset, space, start) = started(&file, Some(&inertia_kg_m2))?;
+    // A run is judged and reported beside the gains that it starts from.
+    let (preset, space, start) = started(&source, Some(&inertia_kg_m2))?;
+    let SpaceSource { name: space_name, text, .. } = source;
     let goals = Goals { objective: args.objective.unwrap_or(space.goals().objective), ..space.goals().clone() };
     if let (Gains::Mrac(_), Some(goal)) = (&start, goals.from(Source::Proved).first()) {
         return Err(Error::NoFigure { goal: *goal });
@@ -184,13 +186,24 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
     })
 }
 
-/// Where a search begins: the name of the gains, the space, and the gains as the space writes them. A start outside the space is refused before anything is computed.
-pub fn started(file: &SpaceFile, inertia_kg_m2: Option<&[f64]>) -> Result<(String, Space, Gains), Error> {
+/// The space of a file with the gains at which its search begins, as the space writes them, and their name; neither for a cold start. A start outside the space is refused before
+/// anything is computed.
+pub fn begun(file: &SpaceFile, inertia_kg_m2: Option<&[f64]>) -> Result<(Space, Option<(String, Gains)>), Error> {
+    if file.is_cold() {
+        return Ok((file.on(Setting { start: None, inertia_kg_m2 })?, None));
+    }
     let controller = if file.controller() == "mrac" { ControllerName::Mrac } else { ControllerName::Aic };
     let preset = file.start().unwrap_or(default_preset(controller)).to_owned();
     let published = GainsSource::find(&preset)?.gains.gains;
     let space = file.on(Setting { start: Some(&published), inertia_kg_m2 })?;
     let start = space.admit(&published)?;
+    Ok((space, Some((preset, start))))
+}
+
+/// The same for whoever needs a start: the name of the gains, the space, and the gains.
+pub fn started(source: &SpaceSource, inertia_kg_m2: Option<&[f64]>) -> Result<(String, Space, Gains), Error> {
+    let (space, start) = begun(&source.space, inertia_kg_m2)?;
+    let (preset, start) = start.ok_or_else(|| Error::ColdStart { space: source.name.clone() })?;
     Ok((preset, space, start))
 }
 

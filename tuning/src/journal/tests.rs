@@ -45,7 +45,7 @@ impl Bench {
         let robot = catalogue::robot("panda", None).unwrap();
         let scenario = catalogue::scenario(None, &robot).unwrap();
         let inertia_kg_m2 = inertia_kg_m2(&robot, &scenario).unwrap();
-        let (preset, space, start) = started(&source.space, Some(&inertia_kg_m2)).unwrap();
+        let (preset, space, start) = started(&source, Some(&inertia_kg_m2)).unwrap();
         let question = Question {
             robot: "panda".to_owned(),
             robot_sha256: robot.sha256(),

@@ -5,6 +5,8 @@ use std::process::{Child, Command, Stdio};
 
 use serde_json::{Value, json};
 
+const SPACE: &str = include_str!("../../spaces/panda-aic.toml");
+
 /// Something that is said now and then beside the answers: it is refused, and changes nothing.
 const NOISE: [&str; 5] = ["{", "{\"tell\":{\"id\":100000,\"score\":1}}", "{\"tell\":{\"id\":0}}", "", "\u{1}\u{2}"];
 
@@ -76,6 +78,19 @@ fn failures_are_told_and_avoided_and_a_known_robot_keeps_unstable_gains_back() {
     assert!(asked.len() < 80, "the schedule scatters over gains of which some are unstable");
     assert_eq!(done["evaluations"], 80);
     assert_eq!(done["best"]["gains"], asked[done["best"]["id"].as_u64().expect("an id") as usize]);
+}
+
+#[test]
+fn a_cold_start_knows_no_gains_and_finds_the_bowl_all_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("cold.toml");
+    let text = SPACE.replace("start = \"pezzato2020-simulation\"", "start = \"cold\"");
+    assert_ne!(text, SPACE);
+    std::fs::write(&file, text).expect("a file");
+    let (warm, ..) = converse("--budget 5", false, |_| false);
+    let (asked, done, _) = converse(&format!("--budget 300 --space {}", file.display()), false, |_| false);
+    assert!(!asked.contains(&warm[0]), "the published gains were asked for");
+    assert!(done["best"]["score"].as_f64().expect("a score") < 1.05, "{done}");
 }
 
 #[test]

@@ -47,6 +47,7 @@ fn prepare(folder: &Path) {
     write("backwards.toml", &SHORT.replace("payload_kg = [0, 0.7]", "payload_kg = [0.7, 0]"));
     write("space-twice.toml", &SPACE.replace("[fixed]", "[fixed]\nkappa_mu = 3.0"));
     write("space-start.toml", &SPACE.replace("lower = 50.0", "lower = 5000.0"));
+    write("space-cold.toml", &SPACE.replace("start = \"pezzato2020-simulation\"", "start = \"cold\""));
     write("space-objective.toml", &SPACE.replace("[search]", "[search]\nobjective = \"fastest\""));
     write("nolimit.urdf", NO_LIMIT);
     write("space-preset.toml", &SPACE.replace("pezzato2020-simulation", "pezato2020-simulation"));
@@ -208,6 +209,7 @@ const CASES: &[(&str, i32, &[&str])] = &[
     ("--robot panda --space space-twice.toml", 1, &["space-twice.toml:", "kappa_mu"]),
     ("--robot panda --space space-start.toml", 1, &["cannot start at kappa_a = 700"]),
     ("--robot panda --space space-preset.toml", 1, &["`pezato2020-simulation`", "try: `pezzato2020-simulation`"]),
+    ("--robot panda --space space-cold.toml", 1, &["`space-cold` says start = \"cold\"", "try: a preset"]),
     // Places to write to.
     ("--robot panda --scenario short.toml --budget 1 --out a-file/sub", 1, &["cannot create a-file/sub"]),
     ("--robot panda --scenario short.toml --budget 1 --out a-file", 1, &["cannot create a-file"]),

@@ -13,6 +13,9 @@ use crate::goals::{Bound, Goal, Goals, Limit};
 /// The version of the file that this crate reads.
 pub const SPACE_SCHEMA: i64 = 1;
 
+/// What `start` says when there are no gains to start from.
+const COLD: &str = "cold";
+
 /// Rows that may be zero: the adaptive controller's derivative gains.
 const MAY_BE_ZERO: [&str; 5] = ["alpha3", "e03", "e13", "f03", "f13"];
 
@@ -249,9 +252,19 @@ impl SpaceFile {
         located(&self.path, &self.text, error)
     }
 
-    /// The name of the preset at which the search starts.
+    /// The name of the preset at which the search starts; none when the file names none, or starts cold.
     pub fn start(&self) -> Option<&str> {
-        self.search.start.as_deref()
+        self.search.start.as_deref().filter(|start| *start != COLD)
+    }
+
+    /// Whether the search starts from no gains: the file says `start = "cold"`.
+    pub fn is_cold(&self) -> bool {
+        self.search.start.as_deref() == Some(COLD)
+    }
+
+    /// What the search is after and what it must keep.
+    pub const fn goals(&self) -> &Goals {
+        &self.goals
     }
 
     /// The controller whose gains the space holds.

@@ -27,7 +27,7 @@
 //!
 //! [search]
 //! method = "schedule"                 # or "cma-es", "nelder-mead", "particle-swarm"
-//! start = "pezzato2020-simulation"    # optional: a preset
+//! start = "pezzato2020-simulation"    # optional: a preset, or "cold", no gains at all
 //! objective = "settling-cost"         # optional, see `goals`
 //! cvar = 0.9                          # optional, see `goals`
 //!

@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use super::*;
+use crate::goals::{Bound, Goal, Reference};
 use certune_closed_loop::{GainsFile, Problem};
 use proptest::prelude::*;
 
@@ -91,6 +92,41 @@ fn the_shipped_space_has_five_degrees_of_freedom_and_holds_the_published_gains()
     assert_eq!(space.method(), Method::Schedule);
     assert_eq!(space.admit(&published()).unwrap(), published());
     assert_eq!(space.decode(&space.encode(&published())), published());
+}
+
+#[test]
+fn the_shipped_spaces_are_after_the_same() {
+    let [aic, mrac] =
+        [SHIPPED, MRAC].map(|text| SpaceFile::parse(Path::new("space.toml"), text).unwrap().goals().clone());
+    assert_eq!(aic, mrac, "controllers are compared fairly");
+    let limits: Vec<(Goal, Bound)> = aic.limits.iter().map(|limit| (limit.goal, limit.bound)).collect();
+    assert_eq!(aic.objective, Goal::SettlingTime);
+    assert_eq!(limits, [(Goal::Overshoot, Bound::At(0.02)), (Goal::Jitter, Bound::Of(Reference::Start))]);
+}
+
+#[test]
+fn goals_out_of_range_are_refused_with_their_line() {
+    let start = published();
+    let refused = |from: &str, to: &str| edited(SHIPPED, from, to, &start).unwrap_err().to_string();
+    assert!(refused("overshoot = 0.02", "overshoot = -1").contains("overshoot = -1, expected a positive"));
+    assert!(refused("objective =", "cvar = 1.0\nobjective =").contains("cvar = 1, expected"));
+    let unknown = on_arm(&SHIPPED.replace("overshoot = 0.02", "overshot = 0.02"), &start).unwrap_err().to_string();
+    assert!(unknown.contains("overshot") && unknown.contains("overshoot"), "{unknown}");
+    let word = on_arm(&SHIPPED.replace("overshoot = 0.02", "overshoot = \"low\""), &start).unwrap_err().to_string();
+    assert!(word.contains("limits.overshoot") || word.contains("overshoot"), "{word}");
+}
+
+#[test]
+fn a_cold_start_is_no_preset() {
+    let from = |start: &str| {
+        let text = SHIPPED.replace("start = \"pezzato2020-simulation\"\n", start);
+        SpaceFile::parse(Path::new("space.toml"), &text).unwrap()
+    };
+    let published = "start = \"pezzato2020-simulation\"\n";
+    let (cold, preset, silent) = (from("start = \"cold\"\n"), from(published), from(""));
+    assert_eq!((cold.is_cold(), cold.start()), (true, None));
+    assert_eq!((preset.is_cold(), preset.start()), (false, Some("pezzato2020-simulation")));
+    assert_eq!((silent.is_cold(), silent.start()), (false, None));
 }
 
 #[test]

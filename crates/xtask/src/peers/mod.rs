@@ -8,11 +8,17 @@
 //! the machine's widest registers reach on one core in the same run.
 
 mod lyapunov;
+mod search;
+mod tuners;
+mod venv;
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+
+pub use search::search;
+pub use tuners::compare;
 
 use crate::{Outcome, cargo, root, run};
 
@@ -96,8 +102,7 @@ impl Programs {
 /// # Errors
 /// A step of the set-up that failed, or a program that printed no figure.
 pub fn peers() -> Outcome {
-    let folder = root().join("target/peers");
-    fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let folder = folder()?;
     let programs = set_up(&folder)?;
     same_arm(&programs)?;
     table(&programs)?;
@@ -105,21 +110,16 @@ pub fn peers() -> Outcome {
     lyapunov::table(&folder)
 }
 
+/// Where the peers live.
+fn folder() -> Result<PathBuf, String> {
+    let folder = root().join("target/peers");
+    fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    Ok(folder)
+}
+
 fn set_up(folder: &Path) -> Result<Programs, String> {
-    let venv = folder.join("venv");
-    // The mark names what is there: another list is fetched anew.
-    if fs::read_to_string(venv.join("ready")).ok().as_deref() != Some(&PACKAGES.join("\n")) {
-        let mut make = Command::new("python3");
-        make.args(["-m", "venv"]).arg(&venv);
-        run("a Python environment for the peers", make)?;
-        let mut install = Command::new(venv.join("bin/python"));
-        install.args(["-m", "pip", "install", "--quiet", "--only-binary=:all:"]).args(PACKAGES);
-        run("the peers from PyPI", install)?;
-        fs::write(venv.join("ready"), PACKAGES.join("\n")).map_err(|e| e.to_string())?;
-    }
-    let site = said(
-        Command::new(venv.join("bin/python")).args(["-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]),
-    )?;
+    let python = venv::python(folder, "venv", &PACKAGES)?;
+    let site = said(Command::new(python).args(["-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]))?;
     let site = PathBuf::from(site.trim());
     let sources = root().join("crates/xtask/peers");
 
@@ -172,9 +172,13 @@ fn compiled(program: &Path, source: &Path, title: &str, command: Command) -> Out
 
 /// The path of a bench of ours, built.
 fn bench(package: &str, name: &str) -> Result<PathBuf, String> {
-    let words = ["bench", "--package", package, "--bench", name, "--no-run", "--message-format=json"];
-    let messages = said(cargo(&words).current_dir(root()))?;
-    // One message a line; the last executable of that name is the bench.
+    built(&["bench", "--package", package, "--bench", name, "--no-run"], name)
+}
+
+/// The path of the executable `name` that cargo builds when told `words`.
+fn built(words: &[&str], name: &str) -> Result<PathBuf, String> {
+    let messages = said(cargo(words).arg("--message-format=json").current_dir(root()))?;
+    // One message a line; the last executable of that name is meant.
     let executable = |line: &str| {
         let rest = line.split("\"executable\":\"").nth(1)?;
         Some(PathBuf::from(rest.split('"').next()?))

@@ -183,11 +183,12 @@ fn session(budget: usize, mistakes: Vec<(Option<Mistake>, usize)>) -> (Vec<Value
         read: 0,
     };
     let file = catalogue::space(None, None).unwrap().space;
-    let (_, space, start) = started(&file, None).unwrap();
+    let (space, start) = begun(&file, None).unwrap();
+    let (_, start) = start.unwrap();
     let settings = SearchSettings::new(space.method(), budget, 1);
     // No buffer beyond a line: whatever is read is read in answer to what has been said.
     let lines = Lines::new(std::io::BufReader::new(partner), Shared(Arc::clone(&said)));
-    let exit = converse(lines, None, &space, &start, &settings).unwrap();
+    let exit = converse(lines, None, &space, Some(&start), &settings).unwrap();
     assert_eq!(exit, Exit::Holds);
     let text = String::from_utf8(said.lock().unwrap().clone()).unwrap();
     let lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
