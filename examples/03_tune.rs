@@ -39,6 +39,7 @@ pub fn main() -> Result<(), Box<dyn Error>> {
         search: SearchSettings::new(space.method(), evaluations, seed),
         batch_plants: 2,
         held_out_plants: 4,
+        worst_plants: 0,
         certification_attempts: 4,
     };
     // The search meets the first plants of the seed behind a filter of 16 linearised loops; the judge has plants that no candidate has met.

@@ -91,12 +91,25 @@ impl PlantBox {
         Ok(())
     }
 
-    /// Plant `index` of `seed` for an arm of `joints` joints. Coulomb friction is zero.
+    /// Plant `index` of `seed` for an arm of `joints` joints.
     pub fn draw(&self, joints: usize, seed: u64, index: u64) -> PlantSetting {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(index);
+        let unit = |_| (rng.next_u64() >> 11) as f64 * 2.0_f64.powi(-53); // 53 bits, in [0, 1)
+        self.at(joints, &(0..self.dimension(joints)).map(unit).collect::<Vec<_>>())
+    }
+
+    /// The numbers that may differ between two plants of an arm with `joints` joints.
+    pub const fn dimension(&self, joints: usize) -> usize {
+        3 * joints + 2
+    }
+
+    /// The plant at a point of the unit cube of [`PlantBox::dimension`]: 0 is the low end of a range, 1 the high one; a coordinate that is missing counts as 0. In the order of the
+    /// coordinates: masses, payload, friction, rotor inertia, delay. Coulomb friction is zero.
+    pub fn at(&self, joints: usize, point: &[f64]) -> PlantSetting {
+        let mut units = point.iter().copied();
         let mut uniform = |[low, high]: [f64; 2]| {
-            let unit = (rng.next_u64() >> 11) as f64 * 2.0_f64.powi(-53); // 53 bits, in [0, 1)
+            let unit = units.next().unwrap_or(0.0);
             low + unit * (high - low)
         };
         let masses = [1.0 - self.mass_uncertainty, 1.0 + self.mass_uncertainty];
@@ -229,6 +242,17 @@ mod tests {
             prop_assert!(within(&plant.rotor_inertia_kg_m2, [0.0, 0.1]));
             prop_assert!((0.0..=0.7).contains(&plant.payload_kg) && plant.delay_samples <= 2 && plant.gravity_compensation);
         }
+    }
+
+    #[test]
+    fn the_corners_of_the_unit_cube_are_those_of_the_box() {
+        let family = pick_and_place();
+        let [low, high] = [0.0, 1.0].map(|end| family.at(2, &vec![end; family.dimension(2)]));
+        assert_eq!((low.link_mass_scale, high.link_mass_scale), (vec![0.8; 2], vec![1.2; 2]));
+        assert_eq!((low.payload_kg, high.payload_kg), (0.0, 0.7));
+        assert_eq!((low.viscous_n_m_s_per_rad, high.viscous_n_m_s_per_rad), (vec![0.5; 2], vec![2.0; 2]));
+        assert_eq!((low.rotor_inertia_kg_m2, high.rotor_inertia_kg_m2), (vec![0.0; 2], vec![0.1; 2]));
+        assert_eq!((low.delay_samples, high.delay_samples), (0, 2));
     }
 
     #[test]

@@ -10,8 +10,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use certune_closed_loop::{
-    Gains, KeyError, Metrics, NoiseStream, Parameters, Plant, PlantError, Run, Scenario, Task, simulate_many,
-    simulate_many_while,
+    Gains, KeyError, Metrics, NoiseStream, Parameters, Plant, PlantBox, PlantError, PlantSetting, Run, Scenario, Task,
+    simulate_many, simulate_many_while,
 };
 use certune_dynamics::Robot;
 use certune_simd::InstructionSet;
@@ -23,7 +23,7 @@ use crate::goals::{Excess, Goal, Goals, Source};
 use crate::outcome::{Finite, Outcome};
 use crate::record::{PlantResult, Verdict};
 use crate::score::Scoring;
-use crate::search::Objective;
+use crate::search::{Hardened, Objective};
 use crate::streams;
 use crate::tune::Judge;
 
@@ -50,7 +50,11 @@ pub struct Batch<const N: usize> {
     task: Task<N>,
     scoring: Scoring,
     seed: u64,
+    robot: Robot,
+    plant_box: PlantBox,
     plants: Vec<(u64, Plant<N>)>,
+    /// Plants that were added.
+    added: u64,
 }
 
 impl<const N: usize> Batch<N> {
@@ -66,7 +70,8 @@ impl<const N: usize> Batch<N> {
         let draw = |index| Ok((index, Plant::new(robot, &scenario.plant_box.draw(N, seed, index))?));
         let plants = indices.map(draw).collect::<Result<_, PlantError>>()?;
         let scoring = Scoring::new(Goals::default(), &task);
-        Ok(Self { task, scoring, seed, plants })
+        let (robot, plant_box) = (robot.clone(), scenario.plant_box.clone());
+        Ok(Self { task, scoring, seed, robot, plant_box, plants, added: 0 })
     }
 
     /// The same plants, judged by other goals. What limits say of the start is not theirs to know: see [`Batch::resolved`].
@@ -116,6 +121,37 @@ impl<const N: usize> Batch<N> {
         &self.task
     }
 
+    /// The family that the plants are drawn from.
+    pub const fn plant_box(&self) -> &PlantBox {
+        &self.plant_box
+    }
+
+    /// The seed of plants and noise.
+    pub(crate) const fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    /// The index of a plant that would be added next.
+    pub(crate) const fn next_index(&self) -> u64 {
+        streams::FIRST_WORST_PLANT + self.added
+    }
+
+    /// A plant of the batch's arm.
+    pub(crate) fn plant(&self, setting: &PlantSetting) -> Result<Plant<N>, PlantError> {
+        Plant::new(&self.robot, setting)
+    }
+
+    /// The same with one more plant, in front of all others.
+    ///
+    /// # Errors
+    /// [`PlantError`] when the setting does not fit the arm.
+    pub fn with_plant(mut self, setting: &PlantSetting) -> Result<Self, PlantError> {
+        let plant = self.plant(setting)?;
+        self.plants.insert(0, (self.next_index(), plant));
+        self.added += 1;
+        Ok(self)
+    }
+
     /// The plants with the indices of their draws.
     pub fn plants(&self) -> &[(u64, Plant<N>)] {
         &self.plants
@@ -133,11 +169,26 @@ impl<const N: usize> Batch<N> {
         plants.iter().map(run).collect()
     }
 
-    /// The figures of one run on each plant.
-    fn metrics<P: Parameters<N>>(&self, params: &P) -> Vec<Metrics> {
+    /// The figures of one run on each of `plants`.
+    fn metrics_on<P: Parameters<N>>(&self, params: &P, plants: &[(u64, Plant<N>)]) -> Vec<Metrics> {
         // As many plants at a time as run side by side.
-        let bundles = self.plants.par_chunks(InstructionSet::widest().lanes());
+        let bundles = plants.par_chunks(InstructionSet::widest().lanes());
         bundles.flat_map_iter(|plants| simulate_many(&self.runs(plants, params))).collect()
+    }
+
+    /// The figures of one run on each plant of the batch.
+    fn metrics<P: Parameters<N>>(&self, params: &P) -> Vec<Metrics> {
+        self.metrics_on(params, &self.plants)
+    }
+
+    /// The outcome of one run on each of `plants`; of none for gains that make no controller.
+    pub(crate) fn outcomes(&self, gains: &Gains, plants: &[(u64, Plant<N>)]) -> Vec<Outcome> {
+        let found = match Checked::new(gains, self.task.step_s) {
+            None => Vec::new(),
+            Some(Checked::Aic(params)) => self.metrics_on(&params, plants),
+            Some(Checked::Mrac(params)) => self.metrics_on(&*params, plants),
+        };
+        found.iter().map(|run| self.scoring.of_run(run)).collect()
     }
 
     /// One run on each plant. Costs one simulation of the scenario per plant.
@@ -372,6 +423,16 @@ impl<const N: usize> SimulatedObjective<'_, N> {
 }
 
 impl<const N: usize> Objective for SimulatedObjective<'_, N> {
+    fn hardened(&self, gains: &Gains, round: u32) -> Option<Hardened<'_>> {
+        // Without runs there is nothing that a plant could make worse.
+        if self.batch.scoring.goals().from(Source::Simulated).is_empty() {
+            return None;
+        }
+        let plant = self.batch.worse_plant(gains, round)?;
+        let batch = self.batch.clone().with_plant(&plant.setting).ok()?;
+        Some(Hardened { objective: Box::new(Self { batch, ..self.clone() }), plant })
+    }
+
     fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
         match Checked::new(gains, self.batch.task.step_s) {
             None => no_controller(),

@@ -16,15 +16,20 @@ pub mod search;
 pub mod space;
 pub mod streams;
 pub mod tune;
+pub mod worst;
 
 pub use batch::{Batch, BatchError, Prover, SimulatedObjective};
 pub use certune_closed_loop::Gains;
 pub use filter::StabilityFilter;
 pub use goals::{Bound, Excess, Goal, GoalError, Goals, Limit, Reference, Source};
 pub use outcome::{Finite, NotFinite, Outcome};
-pub use record::{Attempt, Figures, HeldOut, PlantResult, Question, RunRecord, Sensitivity, SpaceRecord, Verdict};
+pub use record::{
+    Attempt, Figures, HeldOut, PlantResult, Question, RunRecord, Sensitivity, SpaceRecord, Verdict, WorstPlant,
+};
 pub use search::{
-    Candidate, Evaluation, Objective, Phase, Progress, SearchError, SearchRun, SearchSettings, Termination, search,
+    Candidate, Evaluation, Hardened, Objective, Phase, Progress, SearchError, SearchRun, SearchSettings, Termination,
+    search,
 };
 pub use space::{Knob, Method, Range, Scale, Setting, Space, SpaceError, SpaceFile, Tie};
 pub use tune::{Bench, Judge, Stage, TuneError, TuneProgress, Tuned, tune};
+pub use worst::WorsePlant;

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use certune_closed_loop::{Gains, PerJoint};
+use certune_closed_loop::{Gains, PerJoint, PlantSetting};
 use serde::{Deserialize, Serialize};
 
 use crate::goals::{Goal, Goals, Source};
@@ -35,6 +35,8 @@ pub struct Question {
     pub batch_plants: usize,
     /// Plants that judge the winner.
     pub held_out_plants: usize,
+    /// The most plants that are searched for, on which the best candidate fares worse than on those of the batch; they join it. With any, a fifth of the evaluations is kept for them.
+    pub worst_plants: u32,
     /// The most candidates that are brought before the certifier; the start, if none of them passes, comes on top. At least 1.
     pub certification_attempts: usize,
 }
@@ -54,6 +56,18 @@ impl From<&Space> for SpaceRecord {
         let fixed = space.fixed().map(|(row, numbers)| (row.to_owned(), numbers.clone()));
         Self { fixed: fixed.collect(), knobs: space.knobs().to_vec() }
     }
+}
+
+/// A plant on which a candidate fared worse than on all before.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WorstPlant {
+    /// The candidate, by the index of its evaluation.
+    pub evaluation: usize,
+    /// The plant.
+    pub setting: PlantSetting,
+    /// What became of the candidate on it.
+    pub outcome: Outcome,
 }
 
 /// A visit to the certifier.
@@ -176,6 +190,8 @@ pub struct RunRecord {
     pub evaluations: Vec<Evaluation>,
     /// Why the search ended.
     pub termination: Termination,
+    /// The plants that were searched for, in order: one a round.
+    pub worst_plants: Vec<WorstPlant>,
     /// Every visit to the certifier in order.
     pub certification: Vec<Attempt>,
     /// The evaluation of the start.

@@ -1,10 +1,12 @@
 //! From a question to certified gains: search, certify, judge.
 //!
 //! 1. [`search`] ranks candidates by simulation; the start is among them.
-//! 2. The candidates that finished the task, or met the objective otherwise, go before the certifier from the lowest cost upwards until one is certified. A candidate closer than
+//! 2. A search over the plant box looks for the plant on which the best candidate fares worst. If it is worse than all that the search has met, it joins them: the best candidates are
+//!    evaluated again, and the search goes on around the best of them with its share of a fifth of the evaluations. At most `question.worst_plants` rounds; candidates of the last one go on.
+//! 3. The candidates that finished the task, or met the objective otherwise, go before the certifier from the lowest cost upwards until one is certified. A candidate closer than
 //!    [`NEIGHBOUR`] in every coordinate to one that was refused is passed over: its certificate would fail for the same reason.
 //!    When the attempts are used up without a certificate, the start is tried last.
-//! 3. Start and winner run on plants that the search never saw, and each knob of the winner is changed by ±10 %.
+//! 4. Start and winner run on plants that the search never saw, and each knob of the winner is changed by ±10 %.
 //!
 //! The certifier is a closure, so this module knows nothing about proofs: whoever calls it decides what "certified" means, and keeps the evidence.
 
@@ -14,12 +16,21 @@ use certune_closed_loop::Gains;
 use rayon::prelude::*;
 
 use crate::outcome::Outcome;
-use crate::record::{Attempt, HeldOut, Question, RECORD_SCHEMA, RunRecord, Sensitivity, SpaceRecord, Verdict};
-use crate::search::{Evaluation, Objective, Progress, SearchError, SearchRun, search};
-use crate::space::{Knob, Space};
+use crate::record::{
+    Attempt, HeldOut, Question, RECORD_SCHEMA, RunRecord, Sensitivity, SpaceRecord, Verdict, WorstPlant,
+};
+use crate::search::{
+    Candidate, Evaluation, Hardened, Objective, Phase, Progress, SearchError, SearchRun, SearchSettings, Termination,
+    search,
+};
+use crate::space::{Knob, Method, Space};
 
 /// Distance, as a fraction of each knob's range, below which two candidates share the fate of one certificate.
 pub const NEIGHBOUR: f64 = 0.01;
+/// Candidates that are evaluated again when a worse plant has joined.
+const RETESTED: usize = 8;
+/// Edge of the simplex around the best of them, a fraction of each range.
+const POLISH: f64 = 0.03;
 
 /// Plants that the search never sees.
 pub trait Judge: Sync {
@@ -32,6 +43,11 @@ pub trait Judge: Sync {
 pub enum Stage<'a> {
     /// The search; its evaluations are reported through [`Progress`].
     Search,
+    /// A plant is looked for that is worse for the best candidate; then the search goes on with it.
+    WorstPlant {
+        /// The round, from 1.
+        round: u32,
+    },
     /// A candidate is before the certifier.
     Certify {
         /// The visit, from 1.
@@ -101,38 +117,150 @@ pub fn tune<C, R: Display>(
     if question.certification_attempts == 0 {
         return Err(TuneError::NoAttempts);
     }
-    let Bench { objective, judge, progress } = bench;
-    progress.stage(Stage::Search);
-    let mut run = search(space, start, &question.search, objective, progress)?;
+    bench.progress.stage(Stage::Search);
+    // A fifth of the evaluations waits for what the worst plants will show.
+    let reserve = if question.worst_plants == 0 { 0 } else { question.search.evaluations / 5 };
+    let settings = SearchSettings { evaluations: question.search.evaluations - reserve, ..question.search };
+    let run = search(space, start, &settings, bench.objective, bench.progress)?;
     // A search that nobody answers has not even evaluated its start.
     let start = start.filter(|_| !run.evaluations.is_empty()).map(|_| 0);
-    let (certification, winner) =
-        certify_best(&mut run, space, objective, start, question.certification_attempts, progress, certify);
+    let campaign = Campaign { question, space, bench, start, run, worst_plants: Vec::new() };
+    Ok(campaign.finish(bench.objective, certify))
+}
 
-    progress.stage(Stage::Judge);
-    let winner_index = winner.as_ref().map(|(index, _)| *index);
-    let gains_at =
-        |index: Option<usize>| index.and_then(|index| run.evaluations.get(index)).map(|found| found.gains.clone());
-    let (start_gains, tuned_gains) = (gains_at(start), gains_at(winner_index));
-    let start_verdict = start_gains.map(|gains| judge.judge(&gains));
-    let tuned_verdict = if winner_index == start {
-        start_verdict.clone()
-    } else {
-        tuned_gains.as_ref().map(|gains| judge.judge(gains))
-    };
-    let record = RunRecord {
-        schema: RECORD_SCHEMA,
-        question,
-        space: SpaceRecord::from(space),
-        termination: run.termination,
-        certification,
-        start,
-        winner: winner_index,
-        held_out: HeldOut { start: start_verdict, tuned: tuned_verdict },
-        sensitivity: tuned_gains.map_or_else(Vec::new, |gains| sensitivity(space, objective, &gains)),
-        evaluations: run.evaluations,
-    };
-    Ok(Tuned { record, certificate: winner.map(|(_, certificate)| certificate) })
+/// A run between its first search and its end.
+struct Campaign<'a> {
+    question: Question,
+    space: &'a Space,
+    bench: Bench<'a>,
+    start: Option<usize>,
+    run: SearchRun,
+    worst_plants: Vec<WorstPlant>,
+}
+
+impl Campaign<'_> {
+    /// As long as a plant is found that is worse for the best candidate, it joins the others and the search goes on; then certificates and judgement. An objective lives as long as
+    /// the next harder one is made of it, hence the recursion, which is as deep as there are rounds.
+    fn finish<C, R: Display>(
+        mut self,
+        objective: &dyn Objective,
+        certify: impl FnMut(&Gains) -> Result<C, R>,
+    ) -> Tuned<C> {
+        match self.harden(objective) {
+            Some(harder) => self.finish(&*harder, certify),
+            None => self.conclude(objective, certify),
+        }
+    }
+
+    /// The number of the current round.
+    const fn round(&self) -> u32 {
+        self.worst_plants.len() as u32
+    }
+
+    /// The candidates of the current round that have a cost, from the best.
+    fn ranked(&self) -> Vec<Evaluation> {
+        let current =
+            |evaluation: &&&Evaluation| evaluation.round == self.round() && evaluation.outcome.cost().is_some();
+        self.run.ranked().iter().filter(current).map(|evaluation| (*evaluation).clone()).collect()
+    }
+
+    /// A harder objective, with the best candidates so far and those around them evaluated on it.
+    fn harden<'o>(&mut self, objective: &'o dyn Objective) -> Option<Box<dyn Objective + 'o>> {
+        let SearchSettings { evaluations, .. } = self.question.search;
+        let share = evaluations / 5 / (self.question.worst_plants as usize).max(1);
+        if self.round() >= self.question.worst_plants || share < 2 || self.run.termination == Termination::Interrupted {
+            return None;
+        }
+        let ranked = self.ranked();
+        let best = ranked.first()?;
+        self.bench.progress.stage(Stage::WorstPlant { round: self.round() + 1 });
+        let Hardened { objective: harder, plant } = objective.hardened(&best.gains, self.round())?;
+        let again: Vec<Candidate> = ranked
+            .iter()
+            .take(RETESTED.min(share / 2))
+            .map(|evaluation| Candidate { gains: evaluation.gains.clone(), enough: None })
+            .collect();
+        let Some(outcomes) = harder.evaluate_all(&again) else {
+            self.run.termination = Termination::Interrupted;
+            return None;
+        };
+        self.worst_plants.push(WorstPlant { evaluation: best.index, setting: plant.setting, outcome: plant.outcome });
+        let retested = again.len();
+        for (Candidate { gains, .. }, outcome) in again.into_iter().zip(outcomes) {
+            self.record(Phase::Retest, gains, outcome);
+        }
+        let start = self.run.evaluations[self.run.evaluations.len() - retested..]
+            .iter()
+            .min_by_key(|evaluation| (evaluation.outcome, evaluation.index))?
+            .gains
+            .clone();
+        let settings = SearchSettings {
+            method: Method::NelderMead,
+            evaluations: share - retested,
+            simplex_step: POLISH,
+            ..self.question.search
+        };
+        if let Ok(polished) = search(self.space, Some(&start), &settings, &*harder, &()) {
+            if polished.termination == Termination::Interrupted {
+                self.run.termination = Termination::Interrupted;
+            }
+            // Its own start is among those that were evaluated again.
+            for Evaluation { gains, outcome, .. } in polished.evaluations.into_iter().skip(1) {
+                self.record(Phase::Polish, gains, outcome);
+            }
+        }
+        Some(harder)
+    }
+
+    fn record(&mut self, phase: Phase, gains: Gains, outcome: Outcome) {
+        let (index, round) = (self.run.evaluations.len(), self.round());
+        self.run.evaluations.push(Evaluation { index, round, phase, gains, outcome });
+    }
+
+    /// Certificates, and the judgement of plants that the search never saw.
+    fn conclude<C, R: Display>(
+        mut self,
+        objective: &dyn Objective,
+        certify: impl FnMut(&Gains) -> Result<C, R>,
+    ) -> Tuned<C> {
+        let (round, start) = (self.round(), self.start);
+        let Bench { judge, progress, .. } = self.bench;
+        let (certification, winner) = certify_best(
+            &mut self.run,
+            self.space,
+            objective,
+            (start, round),
+            self.question.certification_attempts,
+            progress,
+            certify,
+        );
+        progress.stage(Stage::Judge);
+        let Self { question, space, run, worst_plants, .. } = self;
+        let winner_index = winner.as_ref().map(|(index, _)| *index);
+        let gains_at =
+            |index: Option<usize>| index.and_then(|index| run.evaluations.get(index)).map(|found| found.gains.clone());
+        let (start_gains, tuned_gains) = (gains_at(start), gains_at(winner_index));
+        let start_verdict = start_gains.map(|gains| judge.judge(&gains));
+        let tuned_verdict = if winner_index == start {
+            start_verdict.clone()
+        } else {
+            tuned_gains.as_ref().map(|gains| judge.judge(gains))
+        };
+        let record = RunRecord {
+            schema: RECORD_SCHEMA,
+            question,
+            space: SpaceRecord::from(space),
+            termination: run.termination,
+            worst_plants,
+            certification,
+            start,
+            winner: winner_index,
+            held_out: HeldOut { start: start_verdict, tuned: tuned_verdict },
+            sensitivity: tuned_gains.map_or_else(Vec::new, |gains| sensitivity(space, objective, &gains)),
+            evaluations: run.evaluations,
+        };
+        Tuned { record, certificate: winner.map(|(_, certificate)| certificate) }
+    }
 }
 
 /// Brings candidates before `certify`, and writes the verdicts into their outcomes.
@@ -140,7 +268,7 @@ fn certify_best<C, R: Display>(
     run: &mut SearchRun,
     space: &Space,
     objective: &dyn Objective,
-    start: Option<usize>,
+    (start, round): (Option<usize>, u32),
     attempts: usize,
     progress: &dyn TuneProgress,
     mut certify: impl FnMut(&Gains) -> Result<C, R>,
@@ -158,7 +286,8 @@ fn certify_best<C, R: Display>(
         certificate
     };
     let mut refused: Vec<Vec<f64>> = Vec::new();
-    let mut waiting: Vec<usize> = (0..run.evaluations.len()).collect();
+    let current = |index: &usize| run.evaluations[*index].round == round;
+    let mut waiting: Vec<usize> = (0..run.evaluations.len()).filter(current).collect();
     while visits.len() < attempts
         && let Some(index) = take_best(run, &mut waiting, objective)
     {

@@ -172,10 +172,16 @@ fn stopping_early_changes_no_candidate_and_no_winner() {
 /// A small tuning run of the AIC: one goal, two plants.
 fn run(method: Method, threads: usize, stop_early: bool) -> certune_tune::RunRecord {
     let search = SearchSettings { particles: 6, stop_early, ..SearchSettings::new(method, 36, 5) };
-    run_of(&published(), SPACE, search, threads)
+    run_of(&published(), SPACE, search, 0, threads)
 }
 
-fn run_of(start: &Gains, space_text: &str, search: SearchSettings, threads: usize) -> certune_tune::RunRecord {
+fn run_of(
+    start: &Gains,
+    space_text: &str,
+    search: SearchSettings,
+    worst_plants: u32,
+    threads: usize,
+) -> certune_tune::RunRecord {
     let robot = Robot::panda();
     let scenario = scenario(1, 4.0);
     let space = space(space_text, start).expect("a start in the space");
@@ -188,6 +194,7 @@ fn run_of(start: &Gains, space_text: &str, search: SearchSettings, threads: usiz
         search,
         batch_plants: 2,
         held_out_plants: 3,
+        worst_plants,
         certification_attempts: 3,
     };
     let objective =
@@ -202,7 +209,7 @@ fn run_of(start: &Gains, space_text: &str, search: SearchSettings, threads: usiz
 #[test]
 fn mrac_is_tuned_by_the_same_search_and_threads_do_not_matter() {
     let start = preset(MRAC_PRESET);
-    let run = |threads| run_of(&start, MRAC_SPACE, SearchSettings::new(Method::Schedule, 60, 5), threads);
+    let run = |threads| run_of(&start, MRAC_SPACE, SearchSettings::new(Method::Schedule, 60, 5), 0, threads);
     let one = run(1);
     let [before, after] = [&one.held_out.start, &one.held_out.tuned].map(|verdict| verdict.as_ref().unwrap().outcome);
     assert!(after < before, "{before:?} {after:?}");
@@ -210,6 +217,23 @@ fn mrac_is_tuned_by_the_same_search_and_threads_do_not_matter() {
     assert_eq!(text(&one), text(&run(2)));
     let read: certune_tune::RunRecord = serde_json::from_str(&text(&one)).unwrap();
     assert_eq!(read, one);
+}
+
+#[test]
+fn a_plant_that_was_searched_for_is_worse_than_all_that_were_drawn() {
+    let run = |threads| run_of(&published(), SPACE, SearchSettings::new(Method::NelderMead, 40, 5), 1, threads);
+    let one = run(1);
+    let [found] = &one.worst_plants[..] else { panic!("{:?}", one.worst_plants) };
+    let robot = Robot::panda();
+    let scenario = scenario(1, 4.0);
+    let batch = Batch::<7>::for_search(&robot, &scenario, 5, 2).unwrap();
+    let gains = &one.evaluations[found.evaluation].gains;
+    let drawn = batch.judge(gains);
+    assert!(drawn.plants.iter().all(|plant| plant.outcome < found.outcome), "{drawn:?} {found:?}");
+    // The run on the plant, by itself, gives the same.
+    let harder = batch.with_plant(&found.setting).unwrap().judge(gains);
+    assert!((harder.plants[0].outcome.cost().unwrap() - found.outcome.cost().unwrap()).abs() < 1e-9);
+    assert_eq!(serde_json::to_string(&one).unwrap(), serde_json::to_string(&run(2)).unwrap());
 }
 
 #[test]

@@ -5,9 +5,12 @@ mod common;
 use std::collections::BTreeMap;
 use std::sync::Mutex;
 
+use certune_closed_loop::PlantSetting;
+use certune_dynamics::Robot;
 use certune_tune::{
-    Bench, Candidate, Evaluation, Finite, Gains, Goals, Judge, Method, Objective, Outcome, Progress, Question,
-    RunRecord, SearchSettings, Space, Stage, Termination, TuneError, TuneProgress, Tuned, Verdict, tune,
+    Bench, Candidate, Evaluation, Finite, Gains, Goals, Hardened, Judge, Method, Objective, Outcome, Phase, Progress,
+    Question, RunRecord, SearchSettings, Space, Stage, Termination, TuneError, TuneProgress, Tuned, Verdict,
+    WorsePlant, tune,
 };
 use common::{Numbers, ones as start, space_of};
 
@@ -44,6 +47,7 @@ fn question(method: Method, attempts: usize) -> Question {
         search: SearchSettings::new(method, 60, 3),
         batch_plants: 1,
         held_out_plants: 1,
+        worst_plants: 0,
         certification_attempts: attempts,
     }
 }
@@ -168,6 +172,52 @@ fn the_record_is_the_same_to_the_byte_for_any_number_of_threads() {
     }
 }
 
+/// A cost that rises by a half with every plant that joins, and a bowl whose bottom moves on.
+struct Hardening {
+    plants: u32,
+}
+
+impl Objective for Hardening {
+    fn evaluate(&self, gains: &Gains, _: Option<Finite>) -> Outcome {
+        let plants = f64::from(self.plants);
+        let off = gains.number("kappa_mu").ln() - 0.3 * plants;
+        Outcome::Simulated {
+            cost: Finite::saturating(1.0 + 0.5 * plants + off * off + gains.number("kappa_a").ln().powi(2)),
+        }
+    }
+
+    fn hardened(&self, gains: &Gains, round: u32) -> Option<Hardened<'_>> {
+        assert_eq!(round, self.plants);
+        let harder = Self { plants: self.plants + 1 };
+        let setting = PlantSetting::nominal(&Robot::panda(), true).with_friction(f64::from(harder.plants));
+        let plant = WorsePlant { setting, outcome: harder.evaluate(gains, None) };
+        Some(Hardened { objective: Box::new(harder), plant })
+    }
+}
+
+#[test]
+fn what_is_certified_has_met_every_plant_that_was_found() {
+    for (rounds, expected) in [(0, 0), (2, 2)] {
+        let bench = Bench { objective: &Hardening { plants: 0 }, judge: &Held, progress: &() };
+        let question = Question { worst_plants: rounds, ..question(Method::Schedule, 3) };
+        let tuned = tune(question, &space(), Some(&start()), bench, |_| Ok::<_, &str>(())).unwrap();
+        let record = &tuned.record;
+        rank_is_consistent(record);
+        let winner = record.winner().unwrap();
+        assert_eq!((record.worst_plants.len(), winner.round), (expected, rounds));
+        assert!(record.evaluations.len() <= 60, "{}", record.evaluations.len());
+        assert!(record.evaluations.iter().enumerate().all(|(index, evaluation)| evaluation.index == index));
+        // The best of its round, and a new one: the bottom has moved.
+        let costs = record.evaluations.iter().filter(|one| one.round == rounds).filter_map(|one| one.outcome.cost());
+        assert!((costs.fold(f64::INFINITY, f64::min) - winner.outcome.cost().unwrap()).abs() < 1e-12);
+        for (round, plant) in (1..).zip(&record.worst_plants) {
+            let first = record.evaluations.iter().find(|one| one.round == round).unwrap();
+            let best = &record.evaluations[plant.evaluation];
+            assert_eq!((first.phase, &first.gains, first.outcome), (Phase::Retest, &best.gains, plant.outcome));
+        }
+    }
+}
+
 #[test]
 fn every_stage_is_announced_and_no_attempt_is_refused() {
     #[derive(Default)]
@@ -181,6 +231,7 @@ fn every_stage_is_announced_and_no_attempt_is_refused() {
         fn stage(&self, stage: Stage<'_>) {
             let name = match stage {
                 Stage::Search => "search",
+                Stage::WorstPlant { .. } => "worst plant",
                 Stage::Certify { .. } => "certify",
                 Stage::Judge => "judge",
             };

@@ -55,6 +55,7 @@ impl Bench {
             search: SearchSettings::new(space.method(), budget, 1),
             batch_plants: 1,
             held_out_plants: 1,
+            worst_plants: 0,
             certification_attempts: 1,
         };
         let header = Header {

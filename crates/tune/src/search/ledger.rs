@@ -174,7 +174,7 @@ impl<'a> Ledger<'a> {
             } else {
                 book.known.insert(bits(&gains), index);
                 let phase = book.phase;
-                book.evaluations.push(Evaluation { index, phase, gains, outcome });
+                book.evaluations.push(Evaluation { index, round: 0, phase, gains, outcome });
             }
             if outcome < book.evaluations[book.best].outcome {
                 book.best = index;

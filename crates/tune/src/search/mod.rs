@@ -32,6 +32,7 @@ pub use simplex::SPREAD;
 
 use crate::outcome::{Finite, Outcome};
 use crate::space::{Method, Space, SpaceError};
+use crate::worst::WorsePlant;
 use ledger::Ledger;
 
 /// What turns gains into an outcome. Total: an objective that fails says so by a rank of [`Outcome`].
@@ -46,6 +47,20 @@ pub trait Objective: Sync {
         // Indexed, so that the outcomes come back in the order of the candidates whatever thread made them.
         Some(candidates.par_iter().map(|candidate| self.evaluate(&candidate.gains, candidate.enough)).collect())
     }
+
+    /// The same under conditions that are worse for `gains`, as bad as a search finds them; none when it finds none that are worse, or the conditions are not the objective's to
+    /// choose. `round` numbers the searches.
+    fn hardened(&self, _gains: &Gains, _round: u32) -> Option<Hardened<'_>> {
+        None
+    }
+}
+
+/// An objective that is harder on gains which did well so far.
+pub struct Hardened<'a> {
+    /// The objective.
+    pub objective: Box<dyn Objective + 'a>,
+    /// What made it harder.
+    pub plant: WorsePlant,
 }
 
 /// What a search wants to know.
@@ -89,6 +104,8 @@ pub enum Phase {
         /// 0 for the first run, then the number of the restart.
         restart: u32,
     },
+    /// The best of the round before, on one plant more.
+    Retest,
     /// Nelder-Mead around the best of a search before it.
     Polish,
     /// Particle swarm.
@@ -104,6 +121,8 @@ pub enum Phase {
 pub struct Evaluation {
     /// Its place in the order of the search, from 0.
     pub index: usize,
+    /// On how many plants more than the first time: candidates of different rounds are not comparable.
+    pub round: u32,
     /// Which part of the search asked.
     pub phase: Phase,
     /// The candidate.
