@@ -19,7 +19,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use certune::closed_loop::Scenario;
-use certune::tune::{Candidate, Finite, Gains, Objective, Outcome, Question};
+use certune::tune::{Candidate, Finite, Gains, Hardened, Objective, Outcome, Question};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
@@ -293,6 +293,21 @@ impl<'a> Journalled<'a> {
     fn book(&self) -> MutexGuard<'_, Book<'a>> {
         self.book.lock().unwrap_or_else(PoisonError::into_inner)
     }
+
+    /// The outcomes on `objective`: the journal's, or new ones that go into it.
+    fn answer(&self, candidates: &[Candidate], objective: &dyn Objective) -> Option<Vec<Outcome>> {
+        if candidates.is_empty() {
+            return Some(Vec::new()); // a generation of candidates that are known
+        }
+        let mut book = self.book();
+        match book.answer(candidates, objective, self.stop) {
+            Ok(found) => found,
+            Err(error) => {
+                book.failure = Some(error);
+                None
+            }
+        }
+    }
 }
 
 impl Book<'_> {
@@ -333,17 +348,41 @@ impl Objective for Journalled<'_> {
     }
 
     fn evaluate_all(&self, candidates: &[Candidate]) -> Option<Vec<Outcome>> {
-        if candidates.is_empty() {
-            return Some(Vec::new()); // a generation of candidates that are known
-        }
-        let mut book = self.book();
-        match book.answer(candidates, self.objective, self.stop) {
-            Ok(found) => found,
-            Err(error) => {
-                book.failure = Some(error);
-                None
-            }
-        }
+        self.answer(candidates, self.objective)
+    }
+
+    fn hardened(&self, gains: &Gains, round: u32) -> Option<Hardened<'_>> {
+        harder(self.objective, self, gains, round)
+    }
+}
+
+/// A harder objective, in the same journal. The search for the plant that makes it harder is not journalled: it is a pure function of what is.
+struct Harder<'a, 'b> {
+    objective: Box<dyn Objective + 'a>,
+    journalled: &'a Journalled<'b>,
+}
+
+fn harder<'a, 'b: 'a>(
+    objective: &'a dyn Objective,
+    journalled: &'a Journalled<'b>,
+    gains: &Gains,
+    round: u32,
+) -> Option<Hardened<'a>> {
+    let Hardened { objective, plant } = objective.hardened(gains, round)?;
+    Some(Hardened { objective: Box::new(Harder { objective, journalled }), plant })
+}
+
+impl Objective for Harder<'_, '_> {
+    fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
+        self.objective.evaluate(gains, enough)
+    }
+
+    fn evaluate_all(&self, candidates: &[Candidate]) -> Option<Vec<Outcome>> {
+        self.journalled.answer(candidates, &*self.objective)
+    }
+
+    fn hardened(&self, gains: &Gains, round: u32) -> Option<Hardened<'_>> {
+        harder(&*self.objective, self.journalled, gains, round)
     }
 }
 

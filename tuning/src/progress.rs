@@ -148,6 +148,9 @@ impl TuneProgress for Terminal {
                 self.bar.set_message("first candidate");
                 self.detail(|| format!("[{:5.1} s] search", self.elapsed_s()));
             }
+            Stage::WorstPlant { round } => {
+                self.begin(&format!("looking for plants that are worse for the best candidate (round {round})"));
+            }
             Stage::Certify { attempt, candidate } => {
                 self.begin(&format!(
                     "certifying candidate {} (attempt {attempt}), {}",

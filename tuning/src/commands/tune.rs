@@ -37,6 +37,8 @@ pub const DEFAULT_SEED: u64 = 1;
 pub const DEFAULT_PLANTS: usize = 8;
 /// Plants that judge start and winner.
 const HELD_OUT_PLANTS: usize = 200;
+/// Plants that are searched for at most, on which the best candidate fares worse than on those that were drawn.
+const WORST_PLANTS: u32 = 2;
 /// Candidates brought before the certifier at most.
 const ATTEMPTS: usize = 12;
 
@@ -160,6 +162,7 @@ fn plan(args: &TuneArgs) -> Result<Plan, Error> {
         search: SearchSettings::new(space.method(), budget, seed),
         batch_plants: args.plants.unwrap_or(DEFAULT_PLANTS),
         held_out_plants: HELD_OUT_PLANTS,
+        worst_plants: WORST_PLANTS,
         certification_attempts: ATTEMPTS,
     };
     Ok(Plan {

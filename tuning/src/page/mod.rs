@@ -215,13 +215,18 @@ fn bounds(record: &RunRecord, row: &str, joint: usize, tuned: f64) -> Option<Sea
 
 fn search(record: &RunRecord) -> SearchRecord {
     let objective = record.question.goals.objective;
+    // Costs of different rounds are not comparable: with every plant that joins, the best is sought anew.
     let mut best_so_far: Option<f64> = None;
+    let mut round = 0;
     let evaluations = record.evaluations.iter().map(|evaluation| {
         // A candidate without a certificate has no figure to compare.
         let cost = match evaluation.outcome {
             Outcome::Uncertified { .. } if objective.source() == Source::Proved => None,
             outcome => outcome.cost(),
         };
+        if evaluation.round != round {
+            (round, best_so_far) = (evaluation.round, None);
+        }
         best_so_far = match (best_so_far, cost) {
             (Some(best), Some(cost)) => Some(best.min(cost)),
             (best, cost) => best.or(cost),
@@ -231,6 +236,7 @@ fn search(record: &RunRecord) -> SearchRecord {
             Phase::Simplex => "nelder-mead",
             Phase::Scatter => "scatter",
             Phase::CmaEs { .. } => "cma-es",
+            Phase::Retest => "retest",
             Phase::Polish => "polish",
             Phase::Swarm { .. } => "particle-swarm",
         };
