@@ -9,8 +9,8 @@ use certune_closed_loop::{GainsFile, Scenario};
 use certune_dynamics::{Joints, Model, Robot, mass_matrix};
 use certune_tune::filter::DEFAULT_SAMPLES;
 use certune_tune::{
-    SimulatedObjective, Batch, BatchError, Bench, Finite, Gains, Judge, Method, Objective, ObjectiveName, Outcome,
-    Question, SearchSettings, Setting, Space, SpaceError, SpaceFile, tune,
+    Batch, BatchError, Bench, Finite, Gains, Judge, Method, Objective, ObjectiveName, Outcome, Question,
+    SearchSettings, Setting, SimulatedObjective, Space, SpaceError, SpaceFile, tune,
 };
 use common::Numbers;
 
@@ -86,9 +86,7 @@ fn what_the_filter_rejects_runs_away_or_never_settles() {
 fn the_filter_sees_the_slowest_mode_and_an_euler_step_that_is_too_long() {
     let robot = Robot::panda();
     let objective = SimulatedObjective::<7>::new(&robot, &scenario(1, 6.0), 1, 1, DEFAULT_SAMPLES).unwrap();
-    let growth_per_s = |gains: &Gains| {
-        objective.filter().growth_of(gains, 1e-3).expect("a controller").get()
-    };
+    let growth_per_s = |gains: &Gains| objective.filter().growth_of(gains, 1e-3).expect("a controller").get();
     // The slowest mode of the published gains is the reference's, about 1 /s.
     assert!((-1.2..-0.8).contains(&growth_per_s(&published())), "{}", growth_per_s(&published()));
     assert!(growth_per_s(&published().holding("kappa_mu", 2000.0)) > 0.0, "an Euler step of 2 leak rates is unstable");
@@ -143,8 +141,9 @@ fn a_candidate_is_given_up_exactly_when_it_is_worse_than_what_is_enough() {
 fn the_order_of_the_plants_does_not_change_an_outcome() {
     let objective = SimulatedObjective::<7>::new(&Robot::panda(), &scenario(1, 2.0), 3, 6, 3).unwrap();
     let sorted = objective.clone().hardest_first(&published());
-    let order =
-        |objective: &SimulatedObjective<7>| objective.batch().plants().iter().map(|(index, _)| *index).collect::<Vec<_>>();
+    let order = |objective: &SimulatedObjective<7>| {
+        objective.batch().plants().iter().map(|(index, _)| *index).collect::<Vec<_>>()
+    };
     assert_ne!(order(&objective), order(&sorted), "a batch that is sorted by chance tests nothing");
     let gains = published().holding("kappa_a", 500.0);
     assert_eq!(objective.evaluate(&gains, None), sorted.evaluate(&gains, None));
@@ -154,8 +153,9 @@ fn the_order_of_the_plants_does_not_change_an_outcome() {
 fn stopping_early_changes_no_candidate_and_no_winner() {
     let with = run(Method::ParticleSwarm, 2, true);
     let without = run(Method::ParticleSwarm, 2, false);
-    let gains =
-        |record: &certune_tune::RunRecord| record.evaluations.iter().map(|found| found.gains.clone()).collect::<Vec<_>>();
+    let gains = |record: &certune_tune::RunRecord| {
+        record.evaluations.iter().map(|found| found.gains.clone()).collect::<Vec<_>>()
+    };
     assert_eq!(gains(&with), gains(&without));
     assert_eq!((with.winner, with.tuned()), (without.winner, without.tuned()));
     let stopped = |outcome: &Outcome| matches!(outcome, Outcome::Stopped { .. });

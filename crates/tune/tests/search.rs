@@ -24,13 +24,7 @@ fn simulated(cost_s: f64) -> Outcome {
 
 /// Squared distance, in natural logarithms, to a point that is far from the start in every gain.
 fn bowl(gains: &Gains) -> Outcome {
-    let squares = [
-        ("kappa_mu", 3.0_f64),
-        ("kappa_a", 0.2),
-        ("sigma_dq", 5.0),
-        ("sigma_mu", 0.5),
-        ("sigma_dmu", 2.0),
-    ];
+    let squares = [("kappa_mu", 3.0_f64), ("kappa_a", 0.2), ("sigma_dq", 5.0), ("sigma_mu", 0.5), ("sigma_dmu", 2.0)];
     simulated(squares.iter().map(|(gain, at)| (gains.number(gain) / at).ln().powi(2)).sum())
 }
 
@@ -91,8 +85,7 @@ fn a_cold_swarm_finds_both() {
 
 /// A second basin, deeper than the one at the start and far from it.
 fn two_basins(gains: &Gains) -> Outcome {
-    let distance =
-        |at: f64| ["kappa_mu", "kappa_a", "sigma_dq"].map(|gain| (gains.number(gain) / at).ln().powi(2));
+    let distance = |at: f64| ["kappa_mu", "kappa_a", "sigma_dq"].map(|gain| (gains.number(gain) / at).ln().powi(2));
     let [here, there] = [1.3, 30.0].map(|at| distance(at).iter().sum::<f64>());
     simulated((1.0 + here).min(0.5 + there))
 }

@@ -95,7 +95,8 @@ fn the_best_certified_candidate_wins_over_better_refused_ones() {
     rank_is_consistent(&tuned.record);
     let winner = tuned.record.winner().unwrap();
     assert!(winner.gains.number("kappa_mu") < 2.0 && tuned.record.certification.len() > 1);
-    let better = |other: &&Evaluation| other.outcome.cost() < winner.outcome.cost() && other.gains.number("kappa_mu") < 2.0;
+    let better =
+        |other: &&Evaluation| other.outcome.cost() < winner.outcome.cost() && other.gains.number("kappa_mu") < 2.0;
     assert!(tuned.record.evaluations.iter().find(better).is_none(), "a better candidate would have been certified");
 }
 

@@ -23,7 +23,7 @@ use crate::error::Error;
 use crate::output::{self, number, table};
 use crate::page::{self, Spread, spread};
 use crate::progress::{Terminal, achieved};
-use crate::promise;
+use crate::promise::{self, Promised};
 use crate::run::{Folder, Run, RunFile};
 use crate::sizes::for_joint_count;
 use crate::versions::versions;
@@ -209,9 +209,11 @@ fn tune_arm<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<(Run, St
         .hardest_first(&plan.start);
     let certified = CertifiedObjective::new(question.objective, &certifier, (robot, scenario), seed, DEFAULT_SAMPLES)
         .map_err(misfit)?;
-    let objective: &dyn Objective = match &certified {
-        Some(certified) => certified,
-        None => &simulated,
+    let promised = Promised { objective: &simulated, certifier: &certifier, scenario };
+    let objective: &dyn Objective = match (&certified, &plan.start) {
+        (Some(certified), _) => certified,
+        (None, Gains::Aic(_)) => &simulated,
+        (None, Gains::Mrac(_)) => &promised,
     };
     let bench = Bench { objective, judge: &judge, progress };
     let mut first_refusal: Option<Vec<Certificate>> = None;
