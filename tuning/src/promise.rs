@@ -4,9 +4,13 @@
 //! |---|---|---|
 //! | AIC, the same on every joint | `exponential`, `region` | one |
 //! | AIC, joint by joint | `joint-region` | one |
-//! | MRAC | `adaptive-convergence`, `pi-exponential`, `adaptive-sampled` | one for each goal of the scenario: they are about a box around a goal |
+//! | MRAC | `adaptive-convergence`, `pi-exponential` | one for each goal of the scenario: they are about a box around a goal |
+//!
+//! An AIC that does well is certified almost always, so that the best of a search are asked. The adaptive controller's claims end well inside of what simulates well: its
+//! search asks about every candidate that finishes the task ([`Promised`]).
 
 use certune::closed_loop::{Gains, Scenario};
+use certune::tune::{Finite, Hardened, Objective, Outcome};
 use certune::verify::{Certificate, ClaimKind};
 use certune::{ArmCertifier, ArmGains, Request, StabilityError};
 
@@ -44,8 +48,7 @@ pub fn certify<const N: usize>(
         Gains::Mrac(_) => goals(scenario)
             .into_iter()
             .map(|goal| Request {
-                claims: vec![ClaimKind::AdaptiveConvergence, ClaimKind::PiExponential, ClaimKind::AdaptiveSampled],
-                delay_samples: Some(scenario.plant_box.delay_samples[1]),
+                claims: vec![ClaimKind::AdaptiveConvergence, ClaimKind::PiExponential],
                 at_rad: Some(goal.to_vec()),
                 ..Request::default()
             })
@@ -61,4 +64,28 @@ pub fn certify<const N: usize>(
         }
     }
     Ok(made)
+}
+
+/// An objective behind the promise: a candidate that does not keep it is worse than any that does, whatever it costs.
+pub struct Promised<'a, const N: usize> {
+    pub objective: Box<dyn Objective + 'a>,
+    pub certifier: &'a ArmCertifier<N>,
+    pub scenario: &'a Scenario,
+}
+
+impl<const N: usize> Objective for Promised<'_, N> {
+    fn evaluate(&self, gains: &Gains, enough: Option<Finite>) -> Outcome {
+        let outcome = self.objective.evaluate(gains, enough);
+        let Outcome::Simulated { cost } = outcome else { return outcome };
+        match certify(self.certifier, self.scenario, gains) {
+            Ok(made) if made.iter().all(Certificate::all_hold) => outcome,
+            Ok(_) | Err(_) => Outcome::Uncertified { cost },
+        }
+    }
+
+    fn hardened(&self, gains: &Gains, round: u32) -> Option<Hardened<'_>> {
+        let Hardened { objective, plant } = self.objective.hardened(gains, round)?;
+        let promised = Promised { objective, certifier: self.certifier, scenario: self.scenario };
+        Some(Hardened { objective: Box::new(promised), plant })
+    }
 }

@@ -3,7 +3,6 @@
 //! Its proofs look at a box of configurations around the goal, where the inertia matrix is enclosed entry by entry; what is known of the arm over all angles
 //! holds there as well.
 
-use certune_bounds::enclosure;
 use certune_certify::{EnclosureValues, Problem, adaptive_convergence, adaptive_sampled, pi_exponential};
 use certune_control::mrac::{MracGains, MracParams};
 use certune_verify::{Certificate, Claim, ClaimKind};
@@ -82,7 +81,7 @@ impl<const N: usize> ArmCertifier<N> {
         let end = |x: f64| (x * 1e9).round() / 1e9;
         let lower = setting.goal_rad.map(|x| end(x - setting.half_width_rad));
         let upper = setting.goal_rad.map(|x| end(x + setting.half_width_rad));
-        let found = enclosure(self.members(), &lower, &upper, setting.halvings)?;
+        let found = self.enclosed(&lower, &upper, setting.halvings)?;
         let rows = |matrix: &[[f64; N]; N]| matrix.iter().map(|row| row.to_vec()).collect();
         let values = EnclosureValues {
             lower_rad: lower.to_vec(),

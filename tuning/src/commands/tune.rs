@@ -10,8 +10,9 @@ use certune::control::mrac::MracLaw;
 use certune::dynamics::{Joints, Model, Robot, mass_matrix};
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::{
-    Batch, BatchError, Bench, Evaluation, Gains, Goal, Goals, HeldOut, Outcome, Question, RunRecord, SearchError,
-    SearchSettings, Setting, SimulatedObjective, Source, Space, SpaceFile, Termination, TuneError, Tuned, tune,
+    Batch, BatchError, Bench, Evaluation, Gains, Goal, Goals, HeldOut, Objective, Outcome, Question, RunRecord,
+    SearchError, SearchSettings, Setting, SimulatedObjective, Source, Space, SpaceFile, Termination, TuneError, Tuned,
+    tune,
 };
 use certune::verify::{Certificate, Claim, Record, Verdict};
 use certune::{ArmCertifier, Growth, Over, StabilityError, family_of};
@@ -26,7 +27,7 @@ use crate::journal::{Header, Journal, Journalled};
 use crate::output::{self, table};
 use crate::page::{self, FIGURES, Spread, percent_of_tail, spread};
 use crate::progress::{Terminal, achieved};
-use crate::promise;
+use crate::promise::{self, Promised};
 use crate::run::{Folder, Run, RunFile};
 use crate::sizes::for_joint_count;
 use crate::versions::versions;
@@ -274,10 +275,14 @@ fn tune_arm<const N: usize>(
     let objective =
         SimulatedObjective::<N>::new(robot, scenario, seed, question.batch_plants, DEFAULT_SAMPLES).map_err(misfit)?;
     let goals = objective.batch().resolved(question.goals.clone(), start);
-    let objective = objective.with_goals(&goals, &certifier).hardest_first(start);
+    let simulated = objective.with_goals(&goals, &certifier).hardest_first(start);
     let judge = judge.with_goals(&goals.for_comparison());
     let question = Question { goals, ..question.clone() };
-    let journalled = Journalled::new(&objective, journal, stop);
+    let objective: Box<dyn Objective> = match start {
+        Gains::Aic(_) => Box::new(simulated),
+        Gains::Mrac(_) => Box::new(Promised { objective: Box::new(simulated), certifier: &certifier, scenario }),
+    };
+    let journalled = Journalled::new(&*objective, journal, stop);
     let bench = Bench { objective: &journalled, judge: &judge, progress };
     let mut first_refusal: Option<Vec<Certificate>> = None;
     let mut failure: Option<StabilityError> = None;

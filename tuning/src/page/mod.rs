@@ -215,13 +215,14 @@ fn bounds(record: &RunRecord, row: &str, joint: usize, tuned: f64) -> Option<Sea
 
 fn search(record: &RunRecord) -> SearchRecord {
     let objective = record.question.goals.objective;
+    let asks_each = objective.source() == Source::Proved || is_adaptive(record);
     // Costs of different rounds are not comparable: with every plant that joins, the best is sought anew.
     let mut best_so_far: Option<f64> = None;
     let mut round = 0;
     let evaluations = record.evaluations.iter().map(|evaluation| {
         // A candidate without a certificate has no figure to compare.
         let cost = match evaluation.outcome {
-            Outcome::Uncertified { .. } if objective.source() == Source::Proved => None,
+            Outcome::Uncertified { .. } if asks_each => None,
             outcome => outcome.cost(),
         };
         if evaluation.round != round {
@@ -264,6 +265,11 @@ fn search(record: &RunRecord) -> SearchRecord {
     }
 }
 
+/// Whether the run is about the adaptive controller, whose search asks the certifier about each candidate that finishes the task.
+fn is_adaptive(record: &RunRecord) -> bool {
+    record.evaluations.first().is_some_and(|first| matches!(first.gains, Gains::Mrac(_)))
+}
+
 fn sensitivity(record: &RunRecord) -> Vec<SensitivityRow> {
     let Some(cost) = record.winner().and_then(|winner| winner.outcome.cost()) else { return Vec::new() };
     let ratio = |outcome: Outcome| outcome.cost().map(|changed| changed / cost);
@@ -302,7 +308,11 @@ fn recheck(run: &Run, robot_argument: &str, folder: &Folder, certified: bool) ->
             let goals = promise::goals(scenario).into_iter().take(run.file.certificates());
             for goal in goals {
                 let at = goal.iter().map(ToString::to_string).collect::<Vec<_>>().join(",");
-                let at = if run.file.controller == "mrac" { format!(" --at={at}") } else { String::new() };
+                let at = if run.file.controller == "mrac" {
+                    format!(" --claim adaptive-convergence,pi-exponential --at={at}")
+                } else {
+                    String::new()
+                };
                 lines.push(line(
                     format!("autotune certify --robot {robot} --gains {gains}{scenario_argument}{at}"),
                     "Samples the arm's constants again and searches for the proofs again.",
@@ -369,6 +379,13 @@ fn method(run: &Run, certified: bool) -> Vec<String> {
             0,
             "No candidate was certified. What the page calls tuned is the candidate of the lowest cost; it is not recommended, and no gains \
              file was written."
+                .to_owned(),
+        );
+    }
+    if is_adaptive(record) {
+        paragraphs.push(
+            "The search asked the certifier about every candidate that finished the task: one that was refused ranks below all that were \
+             not, whatever its cost."
                 .to_owned(),
         );
     }

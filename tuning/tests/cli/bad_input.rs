@@ -102,7 +102,7 @@ const CASES: &[(&str, i32, &[&str])] = &[
     ("--robot panda --controller pid", 1, &["pid", "aic"]),
     ("--robot panda --controller mrac --space panda-aic", 1, &["--controller mrac", "holds gains for `aic`"]),
     ("--robot panda --controller mrac --objective certified-rate", 1, &["certified-rate", "settling-cost"]),
-    ("ask-tell --space panda-mrac", 1, &["panda-mrac", "gains.alpha1", "name the robot"]),
+    ("ask-tell --space panda-mrac", 1, &["panda-mrac", "gains.alpha1_arm", "name the robot"]),
     ("verify", 1, &["CERTIFICATE.json"]),
     ("certify --robot panda", 1, &["--gains"]),
     (

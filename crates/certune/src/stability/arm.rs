@@ -1,8 +1,10 @@
 //! An arm with a family of plants and the constants that bound it.
 
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use certune_bounds::{ArmBox, BoundsError, Ranges, SampledConstants, SamplingOptions, sampled_constants};
+use certune_bounds::{
+    ArmBox, BoundsError, Enclosure, Ranges, SampledConstants, SamplingOptions, enclosure, sampled_constants,
+};
 use certune_certify::{ArmValues, ConstantValues, FamilyValues, GoalListValues, Options, Problem, arm_ranges, certify};
 use certune_control::aic::{AicGains, AicParams};
 use certune_dynamics::{Model, Payload, Robot};
@@ -28,6 +30,8 @@ pub struct ArmCertifier<const N: usize> {
     record: Option<Record>,
     sampled: OnceLock<SampledConstants>,
     diagonals: OnceLock<Option<[Vec<f64>; 2]>>,
+    /// Enclosures of M that were asked for, each with its halvings: they do not depend on the gains.
+    enclosures: Arc<Mutex<Vec<(u32, Enclosure<N>)>>>,
 }
 
 impl<const N: usize> ArmCertifier<N> {
@@ -61,6 +65,7 @@ impl<const N: usize> ArmCertifier<N> {
             record: None,
             sampled: OnceLock::new(),
             diagonals: OnceLock::new(),
+            enclosures: Arc::default(),
         })
     }
 
@@ -93,6 +98,25 @@ impl<const N: usize> ArmCertifier<N> {
     /// The box of arms.
     pub(crate) fn members(&self) -> &ArmBox<N> {
         &self.members
+    }
+
+    /// M and the Coriolis form over a box of configurations, found once.
+    pub(crate) fn enclosed(
+        &self,
+        lower_rad: &[f64; N],
+        upper_rad: &[f64; N],
+        halvings: u32,
+    ) -> Result<Enclosure<N>, BoundsError> {
+        let known = || self.enclosures.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = |(of, found): &&(u32, Enclosure<N>)| {
+            *of == halvings && found.lower_rad == *lower_rad && found.upper_rad == *upper_rad
+        };
+        if let Some((_, found)) = known().iter().find(same) {
+            return Ok(found.clone());
+        }
+        let found = enclosure(&self.members, lower_rad, upper_rad, halvings)?;
+        known().push((halvings, found.clone()));
+        Ok(found)
     }
 
     /// The problem of these gains, without claims.

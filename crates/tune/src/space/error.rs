@@ -152,21 +152,6 @@ pub enum SpaceError {
     /// A start that does not fit the arm.
     #[error("the search cannot start there: {0}")]
     Start(Box<SpaceError>),
-    /// A start whose numbers differ where a knob moves them together.
-    #[error(
-        "the search cannot start there: gains.{knob} moves {row} together, which is {first} in one place and {other} in another; \
-             start from gains that are alike there, or tie = \"start\""
-    )]
-    StartNotTied {
-        /// The knob.
-        knob: String,
-        /// The row.
-        row: &'static str,
-        /// The first number.
-        first: f64,
-        /// The first other number.
-        other: f64,
-    },
     /// A start outside the bounds.
     #[error("the search cannot start at {knob} = {value}, which is outside its bounds {lower} to {upper}")]
     StartOutside {
@@ -210,11 +195,9 @@ impl SpaceError {
             | Self::NeedsStart { knob } => format!("gains.{knob}"),
             Self::NothingFree => "fixed".to_owned(),
             Self::Redundant { .. } | Self::Missing { .. } | Self::MissingJoint { .. } => "gains".to_owned(),
-            Self::Start(_)
-            | Self::StartController { .. }
-            | Self::StartNotTied { .. }
-            | Self::StartOutside { .. }
-            | Self::StartNotFixed { .. } => "search.start".to_owned(),
+            Self::Start(_) | Self::StartController { .. } | Self::StartOutside { .. } | Self::StartNotFixed { .. } => {
+                "search.start".to_owned()
+            }
         }
     }
 }

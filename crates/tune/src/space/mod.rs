@@ -72,8 +72,8 @@
 //! Every number of every row is either fixed or moved by exactly one knob. Multiplying the AIC's kappas and sigmas by one number, or the MRAC's l₁ and l₂ by one and its gains by the
 //! inverse, changes nothing ([`Space::written`]), so at least one of those rows must be fixed.
 //!
-//! A start must lie in the space, but for two liberties: it takes the space's law, and numbers tied to the inertia may have any pattern there. They are evaluated as they are, and
-//! the search goes on from the nearest point, in the mean of the logarithms.
+//! A start must lie in the space, but for two liberties: it takes the space's law, and numbers that a knob moves together may differ there as no value of the knob makes them. It is
+//! evaluated as it is, and the search goes on from the nearest point, in the mean of the logarithms.
 
 mod error;
 mod file;
@@ -343,19 +343,13 @@ impl Space {
             }
         }
         for knob in &self.knobs {
+            let (value, Range { lower, upper, .. }) = (knob.value(&admitted), knob.range);
             let values = knob.values(&admitted);
-            let (first, Range { lower, upper, .. }) = (values.first().copied().unwrap_or(f64::NAN), knob.range);
-            if knob.tie == Tie::Shared
-                && let Some(other) = values.iter().find(|value| value.to_bits() != first.to_bits())
-            {
-                let row = admitted.rows().into_iter().find(|(row, _)| knob.per_unit.contains_key(*row));
-                let row = row.map_or("", |(row, _)| row);
-                return Err(SpaceError::StartNotTied { knob: knob.name.clone(), row, first, other: *other });
-            }
-            let slack = if knob.tie == Tie::Shared { 0.0 } else { ROUNDING };
-            let value = knob.value(&admitted);
+            let follows = values.iter().all(|other| (other - value).abs() <= ROUNDING * value);
+            // A value to the bit has no rounding.
+            let slack = if values.iter().all(|other| other.to_bits() == value.to_bits()) { 0.0 } else { ROUNDING };
             let inside = value >= lower * (1.0 - slack) && value <= upper * (1.0 + slack);
-            if knob.tie != Tie::Inertia && !inside {
+            if follows && !inside {
                 return Err(SpaceError::StartOutside { knob: knob.name.clone(), value, lower, upper });
             }
         }

@@ -216,7 +216,6 @@ fn ties_that_make_no_table_are_refused() {
         edited("[1, 1, 1, 1, 2, 2, 2]", "[1, 1]"),
         SpaceError::Length { row: "sigma_dq", found: 2, joints: 7 }
     ));
-    assert!(matches!(edited("tie = \"start\"\n", ""), SpaceError::StartNotTied { first: 10.0, other: 5.0, .. }));
     let text = edited("\"sigma_dmu\"]", "\"sigma_dnu\"]").to_string();
     assert!(text.contains("gains.sigmas.rows[1]") && text.contains("did you mean `sigma_dmu`"), "{text}");
     let bare = SpaceFile::parse(Path::new("space.toml"), PER_JOINT).unwrap();
@@ -268,10 +267,10 @@ fn the_adaptive_start_takes_the_law_of_the_space_and_keeps_its_pattern() {
     assert!(start.rows().iter().zip(admitted.rows()).all(|(a, b)| *a == b), "only the law is another");
     let knob = |name: &str| space.knobs().iter().find(|knob| knob.name == name).unwrap();
     assert_eq!(knob("adaptation").value(&admitted), 1.0);
-    // 40, 200, .. over the inertias: the mean of their logarithms.
+    // 40, 200, .. over the inertias, which no value of the knob makes: the mean of their logarithms.
     let alpha1 = [40.0, 200.0, 40.0, 200.0, 200.0, 200.0, 40.0];
-    let mean = alpha1.iter().zip(INERTIA_KG_M2).map(|(a, m): (&f64, f64)| (a / m).ln()).sum::<f64>() / 7.0;
-    assert!((knob("alpha1").value(&admitted) / mean.exp() - 1.0).abs() < 1e-12);
+    let mean = alpha1.iter().zip(INERTIA_KG_M2).take(4).map(|(a, m): (&f64, f64)| (a / m).ln()).sum::<f64>() / 4.0;
+    assert!((knob("alpha1_arm").value(&admitted) / mean.exp() - 1.0).abs() < 1e-12);
     assert!(matches!(
         edited(MRAC, "l1 = 1.0\n", "l1 = 2.0\n", &start),
         Err(SpaceError::StartNotFixed { row: "l1", value: 1.0, fixed: 2.0 })
