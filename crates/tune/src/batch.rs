@@ -19,6 +19,7 @@ use rayon::prelude::*;
 
 use crate::checked::Checked;
 use crate::filter::StabilityFilter;
+use crate::front::Measure;
 use crate::goals::{Excess, Goal, Goals, Source};
 use crate::outcome::{Finite, Outcome};
 use crate::record::{PlantResult, Verdict};
@@ -438,6 +439,45 @@ impl<const N: usize> Objective for SimulatedObjective<'_, N> {
             None => no_controller(),
             Some(Checked::Aic(params)) => self.answer(gains, &params, enough),
             Some(Checked::Mrac(params)) => self.answer(gains, &*params, enough),
+        }
+    }
+}
+
+impl<const N: usize> SimulatedObjective<'_, N> {
+    fn measured<P: Parameters<N>>(&self, gains: &Gains, params: &P, goals: &[Goal]) -> Result<Vec<f64>, Outcome> {
+        let growth_per_s = self.filter.growth_per_s(params);
+        if growth_per_s.get() >= 0.0 {
+            return Err(Outcome::Unstable { abscissa_per_s: growth_per_s });
+        }
+        let of = |source: Source| goals.iter().copied().filter(|goal| goal.source() == source).collect::<Vec<_>>();
+        let proved = of(Source::Proved);
+        let refused = || Outcome::Uncertified { cost: Finite::saturating(-growth_per_s.get().recip()) };
+        let figures = match proved.is_empty() {
+            true => Vec::new(),
+            false => self.prover.figures(gains, &proved).ok_or_else(refused)?,
+        };
+        let runs = self.batch.metrics(params);
+        let scoring = &self.batch.scoring;
+        // Limits first, and divergence: whoever fails has no figures.
+        let outcome = scoring.of_batch(runs.iter().map(|run| scoring.of_run(run)));
+        if !matches!(outcome, Outcome::Simulated { .. }) {
+            return Err(outcome);
+        }
+        let figure = |goal: &Goal| match goal.source() {
+            Source::Proved => proved.iter().position(|other| other == goal).map_or(0.0, |place| figures[place]),
+            Source::Linearised => self.filter.delay_margin_s(params, self.batch.task.step_s),
+            Source::Simulated => scoring.tail(runs.iter().map(|run| scoring.figure(*goal, run))),
+        };
+        Ok(goals.iter().map(figure).collect())
+    }
+}
+
+impl<const N: usize> Measure for SimulatedObjective<'_, N> {
+    fn measure(&self, gains: &Gains, goals: &[Goal]) -> Result<Vec<f64>, Outcome> {
+        match Checked::new(gains, self.batch.task.step_s) {
+            None => Err(no_controller()),
+            Some(Checked::Aic(params)) => self.measured(gains, &params, goals),
+            Some(Checked::Mrac(params)) => self.measured(gains, &*params, goals),
         }
     }
 }

@@ -8,6 +8,7 @@
 pub mod batch;
 mod checked;
 pub mod filter;
+pub mod front;
 pub mod goals;
 pub mod outcome;
 pub mod record;

@@ -189,9 +189,14 @@ impl Scoring {
 
     /// A cost that a batch cannot end below, from such costs of its plants; 0 for a plant that nobody has seen yet.
     pub(crate) fn of_batch_so_far(&self, plants: &[f64]) -> f64 {
-        let mut costs = plants.to_vec();
-        costs.sort_unstable_by(|a, b| b.total_cmp(a));
-        tail_mean(&costs, self.goals.cvar) * (1.0 - 1e-12)
+        self.tail(plants.iter().copied()) * (1.0 - 1e-12)
+    }
+
+    /// The conditional value at risk of figures.
+    pub(crate) fn tail(&self, figures: impl Iterator<Item = f64>) -> f64 {
+        let mut figures: Vec<f64> = figures.collect();
+        figures.sort_unstable_by(|a, b| b.total_cmp(a));
+        tail_mean(&figures, self.goals.cvar)
     }
 
     /// The outcome of a batch: the conditional value at risk of its costs; the worst outcome if a plant has no cost.

@@ -18,7 +18,7 @@ pub(super) struct BudgetSpent;
 /// The bits of every number, row by row: the identity of a candidate.
 type Bits = Vec<Vec<u64>>;
 
-fn bits(gains: &Gains) -> Bits {
+pub(crate) fn bits(gains: &Gains) -> Bits {
     gains.rows().into_iter().map(|(_, numbers)| numbers.values().iter().map(|x| x.to_bits()).collect()).collect()
 }
 

@@ -34,6 +34,7 @@ use crate::outcome::{Finite, Outcome};
 use crate::space::{Method, Space, SpaceError};
 use crate::worst::WorsePlant;
 use ledger::Ledger;
+pub(crate) use ledger::bits;
 
 /// What turns gains into an outcome. Total: an objective that fails says so by a rank of [`Outcome`].
 pub trait Objective: Sync {
