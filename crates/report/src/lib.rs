@@ -11,6 +11,7 @@
 //! | `claims`  | claims, verdicts and grades in words                             |
 //! | `panels`  | one figure after the other                                       |
 //! | `figure`  | axes, marks and labels over plotters' SVG backend                |
+//! | `front`   | the page of a front of several goals                             |
 //! | `page`    | all of it into `templates/report.html` and `templates/style.css` |
 //!
 //! Limits: the crate draws and does not compute; it sorts, counts and takes maxima, but means, quantiles over time,
@@ -25,11 +26,13 @@ mod claims;
 mod error;
 mod figure;
 mod format;
+mod front;
 mod page;
 mod panels;
 mod record;
 
 pub use error::ReportError;
+pub use front::{FrontGoal, FrontPoint, FrontReport, front_report};
 pub use record::*;
 
 /// The page of one tuning run: a complete HTML document.

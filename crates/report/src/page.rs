@@ -59,11 +59,11 @@ struct OutcomeCount<'a> {
     count: usize,
 }
 
-/// Renders the page of a record that has been checked.
+/// What every page's template is rendered with.
 ///
 /// # Errors
-/// [`ReportError::Draw`] and [`ReportError::Template`].
-pub(crate) fn render(record: &TuningReport) -> Result<String, ReportError> {
+/// [`ReportError::Template`].
+pub(crate) fn environment() -> Result<Environment<'static>, ReportError> {
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
@@ -76,6 +76,15 @@ pub(crate) fn render(record: &TuningReport) -> Result<String, ReportError> {
     environment.add_filter("rounded_down", |value: Option<f64>| value.map(format::rounded_down));
     environment.add_filter("exact", |value: f64| format!("{value}"));
     environment.add_filter("sentence", |text: String| format::sentence(&text));
+    Ok(environment)
+}
+
+/// Renders the page of a record that has been checked.
+///
+/// # Errors
+/// [`ReportError::Draw`] and [`ReportError::Template`].
+pub(crate) fn render(record: &TuningReport) -> Result<String, ReportError> {
+    let mut environment = environment()?;
     environment.add_template("report.html", TEMPLATE)?;
     let page = Page {
         style: STYLE,
