@@ -95,6 +95,11 @@ impl<const N: usize> ArmCertifier<N> {
         &self.family
     }
 
+    /// The box of arms.
+    pub(crate) fn members(&self) -> &ArmBox<N> {
+        &self.members
+    }
+
     /// M and the Coriolis form over a box of configurations, found once.
     pub(crate) fn enclosed(
         &self,
