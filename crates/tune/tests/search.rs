@@ -4,6 +4,7 @@ mod common;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use certune_closed_loop::PerJoint;
 use certune_tune::{
     Candidate, Evaluation, Finite, Gains, Method, Objective, Outcome, Phase, Progress, SearchError, SearchSettings,
     Space, SpaceError, Termination, search,
@@ -17,6 +18,11 @@ fn space(free: usize) -> Space {
 }
 
 const METHODS: [Method; 4] = [Method::Schedule, Method::CmaEs, Method::NelderMead, Method::ParticleSwarm];
+
+/// The same gains with another number in a row, on every joint.
+fn holding(gains: Gains, row: &str, value: f64) -> Gains {
+    gains.with(row, PerJoint::Shared(value))
+}
 
 fn simulated(cost_s: f64) -> Outcome {
     Outcome::Simulated { cost: Finite::saturating(cost_s) }
@@ -61,7 +67,7 @@ fn nelder_mead_finds_the_bottom_of_a_bowl_in_five_gains() {
 #[test]
 fn nelder_mead_follows_rosenbrocks_valley() {
     let settings = SearchSettings::new(Method::NelderMead, 300, 0);
-    let start = ones().holding("kappa_mu", (-1.2_f64).exp()).holding("kappa_a", std::f64::consts::E);
+    let start = holding(holding(ones(), "kappa_mu", (-1.2_f64).exp()), "kappa_a", std::f64::consts::E);
     let run = search(&space(2), Some(&start), &settings, &valley, &()).unwrap();
     assert!(cost_s(run.ranked()[0]) < 1e-6, "{:?}", run.ranked()[0]);
 }
@@ -185,7 +191,7 @@ fn settings_out_of_range_are_refused() {
     assert_eq!(run(&SearchSettings { particles: 1, ..good }), SearchError::Particles { particles: 1 });
     assert_eq!(run(&SearchSettings { simplex_step: 0.0, ..good }), SearchError::SimplexStep { simplex_step: 0.0 });
     assert!(matches!(run(&SearchSettings { simplex_step: f64::NAN, ..good }), SearchError::SimplexStep { .. }));
-    let outside = search(&space(2), Some(&ones().holding("kappa_a", 1e3)), &good, &bowl, &());
+    let outside = search(&space(2), Some(&holding(ones(), "kappa_a", 1e3)), &good, &bowl, &());
     assert!(matches!(outside, Err(SearchError::Start(SpaceError::StartOutside { knob, .. })) if knob == "kappa_a"));
 }
 

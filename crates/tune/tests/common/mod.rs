@@ -10,17 +10,11 @@ use certune_tune::{Gains, Setting, Space, SpaceFile};
 pub trait Numbers {
     /// The number of a row.
     fn number(&self, row: &str) -> f64;
-    /// The same gains with another number in a row.
-    fn holding(&self, row: &str, value: f64) -> Self;
 }
 
 impl Numbers for Gains {
     fn number(&self, row: &str) -> f64 {
         self.row(row).and_then(PerJoint::shared).expect("a row that all joints share")
-    }
-
-    fn holding(&self, row: &str, value: f64) -> Self {
-        self.clone().with(row, PerJoint::Shared(value))
     }
 }
 
