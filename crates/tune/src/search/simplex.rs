@@ -20,7 +20,6 @@ pub(super) fn simplex(centre: &[f64], step: f64) -> Result<NelderMead, SetupErro
         tol_fun: score_of_ratio(SPREAD),
         tol_x: WIDTH,
         restarts: u32::MAX,
-        ..NelderMeadOptions::default()
     };
     NelderMead::new(centre, step, options)
 }
