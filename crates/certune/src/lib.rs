@@ -59,6 +59,10 @@ pub mod guide {}
 #[doc = include_str!("_docs/speed.md")]
 pub mod speed {}
 
+/// How the search of gains compares with its peers.
+#[doc = include_str!("_docs/search.md")]
+pub mod search {}
+
 mod adaptive;
 mod lyapunov;
 mod stability;

@@ -108,6 +108,16 @@ fn the_schedule_leaves_the_basin_of_its_start_for_a_better_one() {
     assert!(found.iter().filter(|cost| (**cost - 0.5).abs() < 1e-3).count() >= 8, "{found:?}");
 }
 
+#[test]
+fn a_small_budget_is_the_simplexs_as_long_as_it_gains() {
+    let run = |budget| {
+        let settings = SearchSettings::new(Method::Schedule, budget, 3);
+        search(&space(5), Some(&ones()), &settings, &bowl, &()).unwrap().evaluations
+    };
+    assert!(run(200)[1..].iter().all(|evaluation| evaluation.phase == Phase::Simplex));
+    assert!(run(300).iter().any(|evaluation| evaluation.phase == Phase::Scatter), "and no more than a small one");
+}
+
 /// An objective that takes every chance to stop.
 struct Hasty(fn(&Gains) -> Outcome);
 

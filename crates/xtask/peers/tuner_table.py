@@ -58,7 +58,7 @@ def compare(rows, settings, figure):
         return statistics.median(best), max(best)
 
     def line(title, cells):
-        print(f"{title:<30}" + "".join(f" {median:>12} {worst:>9}" for median, worst in cells), flush=True)
+        print(f"{title:<32}" + "".join(f" {median:>12} {worst:>9}" for median, worst in cells), flush=True)
 
     print(f"\nbest after so many evaluations, median and worst of {len(SEEDS)} seeds")
     line("", [(f"{s.budget:,}", "published" if s.warm else "cold") for s in settings])

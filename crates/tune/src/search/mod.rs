@@ -156,7 +156,7 @@ pub struct SearchSettings {
     pub seed: u64,
     /// Particles of the swarm, at least 2. Default 10.
     pub particles: usize,
-    /// Size of the first simplex along each coordinate, a fraction of the range in `(0, 0.5]`. Default 0.15.
+    /// Size of the first simplex along each coordinate, a fraction of the range in `(0, 0.5]`. Default 0.1: a start that is good should be left in small steps.
     pub simplex_step: f64,
     /// Whether a candidate is given up once its place no longer matters. Default true; the winner is the same either way.
     pub stop_early: bool,
@@ -165,7 +165,7 @@ pub struct SearchSettings {
 impl SearchSettings {
     /// Settings with the default swarm and simplex.
     pub const fn new(method: Method, evaluations: usize, seed: u64) -> Self {
-        Self { method, evaluations, seed, particles: 10, simplex_step: 0.15, stop_early: true }
+        Self { method, evaluations, seed, particles: 10, simplex_step: 0.1, stop_early: true }
     }
 }
 

@@ -36,7 +36,9 @@ pub fn compare(script: &str) -> Outcome {
     command.env("AUTOTUNE", built(&["build", "--release", "--package", "autotune"], "autotune")?);
     // What Python and its compiler keep belongs with the other things that are built.
     command.env("PYTHONPYCACHEPREFIX", folder.join("python")).env("NUMBA_CACHE_DIR", folder.join("numba"));
-    // One thread for each of the two processes that the programs start.
-    command.env("OMP_NUM_THREADS", "1").env("OPENBLAS_NUM_THREADS", "1");
+    // The programs start two processes; each has one thread, and so has what it starts.
+    for threads in ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"] {
+        command.env(threads, "1");
+    }
     run(script, command)
 }
