@@ -13,7 +13,7 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use crate::commands::{
-    ask_tell, certify, constants, diff, evaluate, inspect, lists, report, resume, runs, simulate, tune, verify,
+    ask_tell, certify, constants, diff, evaluate, front, inspect, lists, report, resume, runs, simulate, tune, verify,
 };
 use crate::error::Error;
 use crate::interrupt;
@@ -64,6 +64,10 @@ pub enum Command {
     AskTell(AskTellArgs),
     /// What becomes of gains that you provide: gains in and figures out, a JSON line each
     Evaluate(EvaluateArgs),
+    /// Find what two or three goals cost each other: certified points of which none is better in every goal
+    Front(FrontArgs),
+    /// Write gains and certificates of one point of a front
+    Pick(PickArgs),
     /// Finish a run that was interrupted
     Resume(ResumeArgs),
     /// List the runs in a folder
@@ -195,6 +199,58 @@ pub struct EvaluateArgs {
     /// Seed of every random draw [default: 1]
     #[arg(long, value_name = "S")]
     pub seed: Option<u64>,
+}
+
+#[derive(Debug, Args)]
+pub struct FrontArgs {
+    #[command(flatten)]
+    pub robot: RobotArgs,
+    /// Two or three goals, separated by commas; for their names see --objective of `autotune tune`
+    #[arg(long, value_name = "GOAL,GOAL[,GOAL]", value_parser = objective, value_delimiter = ',', required = true)]
+    pub goals: Vec<Goal>,
+    /// Controller to tune [default: aic]
+    #[arg(long, value_name = "NAME")]
+    pub controller: Option<ControllerName>,
+    /// Search space, whose limits every point keeps: a TOML file [default: the built-in panda-aic]
+    #[arg(long, value_name = "FILE")]
+    pub space: Option<String>,
+    /// Scenario by name or TOML file [default: pick-and-place; for a URDF file a generic one]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub scenario: Option<String>,
+    /// Candidates to measure [default: 600]
+    #[arg(long, value_name = "N")]
+    pub budget: Option<usize>,
+    /// Plants of the scenario's box on which each candidate is simulated [default: 8]
+    #[arg(long, value_name = "N", value_parser = plants)]
+    pub plants: Option<usize>,
+    /// Seed of every random draw [default: 1]
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Threads; the result does not depend on it [default: one per core]
+    #[arg(long, value_name = "T", value_parser = threads)]
+    pub threads: Option<usize>,
+    /// Folder for the results [default: runs/ROBOT-CONTROLLER-front-SEED]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct PickArgs {
+    /// Folder of the front
+    #[arg(value_name = "FRONT_DIR")]
+    pub front_dir: PathBuf,
+    /// Number of the point, as the front's table has it
+    #[arg(long, value_name = "K")]
+    pub point: usize,
+    /// The URDF file of a front that was made with one
+    #[arg(long, value_name = "FILE.urdf")]
+    pub robot: Option<String>,
+    /// Its last link, if it was named
+    #[arg(long, value_name = "LINK", requires = "robot")]
+    pub tip: Option<String>,
+    /// Folder for gains and certificates [default: FRONT_DIR/point-K]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -467,6 +523,8 @@ fn dispatch(cli: Cli) -> Result<Exit, Error> {
         (Some(Command::Tune(args)), _) | (None, Some(args)) => tune::run(&args, context),
         (Some(Command::AskTell(args)), _) => ask_tell::run(&args),
         (Some(Command::Evaluate(args)), _) => evaluate::run(&args),
+        (Some(Command::Front(args)), _) => front::run(&args, context),
+        (Some(Command::Pick(args)), _) => front::pick(&args, context),
         (Some(Command::Resume(args)), _) => resume::run(&args, context),
         (Some(Command::Runs(args)), _) => runs::run(&args, context),
         (Some(Command::Diff(args)), _) => diff::run(&args, context),

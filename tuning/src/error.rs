@@ -69,6 +69,15 @@ pub enum Error {
     /// A run that would have nothing to be compared with.
     #[error("search space `{space}` says start = \"cold\", but a run is reported beside the gains that it starts from")]
     ColdStart { space: String },
+    /// Goals that make no front.
+    #[error(transparent)]
+    Front(#[from] certune::tune::front::FrontError),
+    /// A number that no point has.
+    #[error("point {point}: the front has the points 1 to {most}")]
+    NoPoint { point: usize, most: usize },
+    /// A point that was certified once and is not now, which would be another version's doing.
+    #[error("point {point} is not certified by this version; nothing was written")]
+    PointRefused { point: usize },
     /// A list on the command line that does not fit the robot.
     #[error("{flag} has {found} numbers, but robot `{robot}` has {joints} joints")]
     ListLength { flag: &'static str, found: usize, robot: String, joints: usize },
@@ -162,6 +171,11 @@ impl Error {
                 "a preset as [search] start, see `autotune presets`; `autotune ask-tell` searches from no gains"
                     .to_owned(),
             ),
+            Self::Front(certune::tune::front::FrontError::Goals { .. }) => {
+                Some("--goals settling-time,jitter,certified-radius".to_owned())
+            }
+            Self::NoPoint { .. } => Some("a number of the table in the front's folder, front.html".to_owned()),
+            Self::PointRefused { .. } => Some("the front made again with this version".to_owned()),
             Self::ListLength { joints, .. } => Some(format!("{joints} numbers separated by commas, base to tip")),
             Self::Stability(StabilityError::NoTorqueLimit { .. }) => {
                 Some("--torque-limits with a number, or an `effort` for every joint in the URDF file".to_owned())
@@ -197,6 +211,7 @@ impl Error {
             | Self::Gains { .. }
             | Self::Stability(_)
             | Self::Batch(_)
+            | Self::Front(_)
             | Self::Tune(_)
             | Self::Report(_)
             | Self::Signal(_)

@@ -6,6 +6,7 @@ pub mod claims;
 pub mod constants;
 pub mod diff;
 pub mod evaluate;
+pub mod front;
 pub mod inspect;
 pub mod lists;
 pub mod report;

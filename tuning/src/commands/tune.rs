@@ -222,7 +222,7 @@ pub fn inertia_kg_m2(robot: &Robot, scenario: &Scenario) -> Result<Vec<f64>, Err
 }
 
 /// `panda-aic-1`; a URDF may name its robot with anything, a folder may not.
-fn run_name(robot: &Robot, controller: &str, seed: u64) -> String {
+pub fn run_name(robot: &Robot, controller: &str, seed: u64) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '-' | '_') { c } else { '_' };
     let name: String = robot.name().chars().map(plain).take(64).collect();
     format!("{}-{controller}-{seed}", if name.is_empty() { "robot" } else { &name })
