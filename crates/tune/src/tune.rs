@@ -146,10 +146,18 @@ impl Campaign<'_> {
         objective: &dyn Objective,
         certify: impl FnMut(&Gains) -> Result<C, R>,
     ) -> Tuned<C> {
-        match self.harden(objective) {
-            Some(harder) => self.finish(&*harder, certify),
-            None => self.conclude(objective, certify),
+        if let Some(harder) = self.harden(objective) {
+            return self.finish(&*harder, certify);
         }
+        // What no plant has asked for is the last digits'.
+        let left = self.question.search.evaluations.saturating_sub(self.run.evaluations.len());
+        let best = self.ranked().first().map(|best| best.gains.clone());
+        if let Some(best) = best
+            .filter(|_| self.question.worst_plants > 0 && left > 1 && self.run.termination == Termination::BudgetSpent)
+        {
+            self.polish(objective, &best, left);
+        }
+        self.conclude(objective, certify)
     }
 
     /// The number of the current round.
@@ -194,22 +202,22 @@ impl Campaign<'_> {
             .min_by_key(|evaluation| (evaluation.outcome, evaluation.index))?
             .gains
             .clone();
-        let settings = SearchSettings {
-            method: Method::NelderMead,
-            evaluations: share - retested,
-            simplex_step: POLISH,
-            ..self.question.search
-        };
-        if let Ok(polished) = search(self.space, Some(&start), &settings, &*harder, &()) {
-            if polished.termination == Termination::Interrupted {
-                self.run.termination = Termination::Interrupted;
-            }
-            // Its own start is among those that were evaluated again.
-            for Evaluation { gains, outcome, .. } in polished.evaluations.into_iter().skip(1) {
-                self.record(Phase::Polish, gains, outcome);
-            }
-        }
+        self.polish(&*harder, &start, share - retested);
         Some(harder)
+    }
+
+    /// Nelder-Mead around the best candidate of the round.
+    fn polish(&mut self, objective: &dyn Objective, best: &Gains, evaluations: usize) {
+        let settings =
+            SearchSettings { method: Method::NelderMead, evaluations, simplex_step: POLISH, ..self.question.search };
+        let Ok(polished) = search(self.space, Some(best), &settings, objective, &()) else { return };
+        if polished.termination == Termination::Interrupted {
+            self.run.termination = Termination::Interrupted;
+        }
+        // Its own start is known.
+        for Evaluation { gains, outcome, .. } in polished.evaluations.into_iter().skip(1) {
+            self.record(Phase::Polish, gains, outcome);
+        }
     }
 
     fn record(&mut self, phase: Phase, gains: Gains, outcome: Outcome) {
