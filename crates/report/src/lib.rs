@@ -9,6 +9,7 @@
 //! | `check`   | what a record must satisfy before it is shown                    |
 //! | `answer`  | the first screen in words                                        |
 //! | `claims`  | claims, verdicts and grades in words                             |
+//! | `learnt`  | what the candidates say together, in words                       |
 //! | `panels`  | one figure after the other                                       |
 //! | `figure`  | axes, marks and labels over plotters' SVG backend                |
 //! | `page`    | all of it into `templates/report.html` and `templates/style.css` |
@@ -25,6 +26,7 @@ mod claims;
 mod error;
 mod figure;
 mod format;
+mod learnt;
 mod page;
 mod panels;
 mod record;
