@@ -21,14 +21,18 @@ pub(crate) fn check(record: &TuningReport) -> Result<(), ReportError> {
         bands(band)?;
     }
     for slice in &record.learnt.slices {
-        for (series, cells) in [("learnt.slices.stable", &slice.stable), ("learnt.slices.certified", &slice.certified)] {
+        for (series, cells) in [("learnt.slices.stable", &slice.stable), ("learnt.slices.certified", &slice.certified)]
+        {
             let columns = cells.first().map_or(0, Vec::len);
             cells.iter().try_for_each(|row| length(series, columns, row.len()))?;
         }
     }
     if let Some(surface) = &record.learnt.surface {
         let gains = surface.gains.len();
-        surface.directions.iter().try_for_each(|one| length("learnt.surface.directions.parts", gains, one.parts.len()))?;
+        surface
+            .directions
+            .iter()
+            .try_for_each(|one| length("learnt.surface.directions.parts", gains, one.parts.len()))?;
     }
     for (index, claim) in record.certificate.claims.iter().enumerate() {
         let short_of_proof = claims::worth(claim) < Grade::Proved;

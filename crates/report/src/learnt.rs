@@ -78,10 +78,15 @@ fn directions(surface: &Surface) -> Vec<String> {
         let way = |part: f64| if part > 0.0 { "up" } else { "down" };
         named.map(|(gain, part)| format!("{} {}", gain.gain, way(*part))).collect::<Vec<_>>().join(" with ")
     };
-    let stiff = format!("Stiff: {}. A tenth of the range changes the cost by {}.", moves(stiffest), percent(stiffest.change));
+    let stiff =
+        format!("Stiff: {}. A tenth of the range changes the cost by {}.", moves(stiffest), percent(stiffest.change));
     let slack = surface.directions.iter().skip(1).filter(|direction| direction.change < SLACK * stiffest.change);
     let slack = slack.map(|direction| {
-        format!("Slack: {}. The cost hardly changes: {} for a tenth of the range.", moves(direction), percent(direction.change))
+        format!(
+            "Slack: {}. The cost hardly changes: {} for a tenth of the range.",
+            moves(direction),
+            percent(direction.change)
+        )
     });
     std::iter::once(stiff).chain(slack).collect()
 }
@@ -94,9 +99,9 @@ fn held_back(record: &TuningReport) -> Vec<String> {
     } else {
         format!("On a bound of the search: {}. A wider range might do better.", on_bound.join(", "))
     };
-    let parts: Vec<String> =
-        cost_parts.iter().map(|part| format!("{} {}", part.name, percent(part.share))).collect();
-    let parts = (!parts.is_empty()).then(|| format!("What the cost on the nominal arm is made of: {}.", parts.join(", ")));
+    let parts: Vec<String> = cost_parts.iter().map(|part| format!("{} {}", part.name, percent(part.share))).collect();
+    let parts =
+        (!parts.is_empty()).then(|| format!("What the cost on the nominal arm is made of: {}.", parts.join(", ")));
     let costliest = costliest(&record.held_out.plants).map(|(plant, cost)| {
         format!(
             "The costliest held-out arm is draw {}{}, at {}.",
@@ -152,7 +157,10 @@ mod tests {
     fn a_slack_direction_is_named_and_a_middling_one_is_not() {
         let along = |parts: [f64; 2], change| Direction { parts: parts.to_vec(), change };
         let said = directions(&surface(vec![along([0.8, -0.6], 0.05), along([0.6, 0.8], 0.001)]));
-        assert_eq!(said[0], "Stiff: kappa_mu up with sigma_mu down. A tenth of the range changes the cost by 5.00\u{a0}%.");
+        assert_eq!(
+            said[0],
+            "Stiff: kappa_mu up with sigma_mu down. A tenth of the range changes the cost by 5.00\u{a0}%."
+        );
         assert!(said[1].starts_with("Slack: kappa_mu up with sigma_mu up. The cost hardly changes"));
         assert_eq!(directions(&surface(vec![along([1.0, 0.1], 0.05), along([-0.1, 1.0], 0.02)])).len(), 1);
         assert!(directions(&surface(Vec::new())).is_empty());
@@ -168,7 +176,11 @@ mod tests {
     #[test]
     fn a_limit_is_kept_near_far_or_not_at_all() {
         let said = |excess| {
-            nearest(&NearestLimit { in_words: "overshoot at most 2 %".to_owned(), figure_in_words: "1.9 %".to_owned(), excess })
+            nearest(&NearestLimit {
+                in_words: "overshoot at most 2 %".to_owned(),
+                figure_in_words: "1.9 %".to_owned(),
+                excess,
+            })
         };
         assert!(said(Some(-0.02)).ends_with("this limit holds the gains back."));
         assert!(said(Some(-0.5)).ends_with("no limit holds the gains back."));

@@ -105,8 +105,8 @@ pub fn surface(record: &RunRecord, gains: &Gains) -> Result<Surface, TooFew> {
     let fit = Quadratic::fit(&near, reach);
     let name = |index: usize| knobs[index].name.clone();
     let ends = centre.map(|place| [(-reach).max(-place), reach.min(1.0 - place)]);
-    let Shares { alone, together, directions } =
-        fit.shares(&ends.map(|[lower, upper]| 0.5 * (lower + upper)), &ends.map(|[lower, upper]| 0.5 * (upper - lower)));
+    let Shares { alone, together, directions } = fit
+        .shares(&ends.map(|[lower, upper]| 0.5 * (lower + upper)), &ends.map(|[lower, upper]| 0.5 * (upper - lower)));
     Ok(Surface {
         round,
         points: near.len(),
@@ -215,12 +215,10 @@ impl Quadratic {
         let knobs = slope.len();
         let total: f64 = pairs(knobs).map(part).sum();
         let share = |pair: [usize; 2]| if total > 0.0 { part(pair) / total } else { 0.0 };
-        let mut together: Vec<_> =
-            pairs(knobs).filter(|[i, j]| i != j).map(|pair| (pair, share(pair))).collect();
+        let mut together: Vec<_> = pairs(knobs).filter(|[i, j]| i != j).map(|pair| (pair, share(pair))).collect();
         together.sort_by(|(_, a), (_, b)| b.total_cmp(a));
 
-        let squares =
-            &slope * slope.transpose() + &self.hessian * DMatrix::from_diagonal(&variances) * &self.hessian;
+        let squares = &slope * slope.transpose() + &self.hessian * DMatrix::from_diagonal(&variances) * &self.hessian;
         let eigen = squares.symmetric_eigen();
         let mut directions: Vec<Direction> = eigen
             .eigenvalues

@@ -5,6 +5,8 @@
 
 mod evidence;
 mod figures;
+mod learnt;
+mod maps;
 mod runs;
 
 use certune::closed_loop::{Gains, PlantBox};
@@ -39,6 +41,7 @@ pub fn page<const N: usize>(run: &Run, robot: &Robot, robot_argument: &str, fold
         held_out: runs.held_out,
         search: search(record),
         sensitivity: sensitivity(record),
+        learnt: learnt::learnt(run, &gains, runs.cost_parts, maps::slices::<N>(run, robot, &gains)?),
         certificate: evidence::evidence::<N>(run, robot, &gains)?,
         recheck: recheck(run, robot_argument, folder, certified),
         method: method(run, certified),

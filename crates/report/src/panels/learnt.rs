@@ -21,8 +21,10 @@ pub(super) fn shares(learnt: &Learnt) -> Result<Option<String>, ReportError> {
     let Some(surface) = &learnt.surface else { return Ok(None) };
     let alone = surface.gains.iter().map(|gain| (gain.gain.clone(), gain.share));
     let pairs = surface.pairs.iter().filter(|pair| pair.share >= LEAST_SHARE).take(MOST_PAIRS);
-    let rows: Vec<(String, f64)> =
-        alone.chain(pairs.map(|pair| (pair.gains.join(" with "), pair.share))).filter(|(_, share)| share.is_finite()).collect();
+    let rows: Vec<(String, f64)> = alone
+        .chain(pairs.map(|pair| (pair.gains.join(" with "), pair.share)))
+        .filter(|(_, share)| share.is_finite())
+        .collect();
     if rows.is_empty() {
         return Ok(None);
     }
@@ -31,11 +33,17 @@ pub(super) fn shares(learnt: &Learnt) -> Result<Option<String>, ReportError> {
     for (index, (_, share)) in rows.iter().enumerate() {
         let from = (0.0, row_at(index));
         marks.push(Mark::Bar { ink: Ink::Tuned, opacity: 1.0, height: 11.0, from, to_x: 100.0 * share });
-        marks.push(Mark::EndLabel { ink: Ink::Text, text: format!("{} %", format::number(100.0 * share)), y: row_at(index) });
+        marks.push(Mark::EndLabel {
+            ink: Ink::Text,
+            text: format!("{} %", format::number(100.0 * share)),
+            y: row_at(index),
+        });
     }
     Plot {
         title: "Share of each gain in the cost".to_owned(),
-        description: "One bar for each gain alone and for the strongest two pairs, in percent of the surface's variance.".to_owned(),
+        description:
+            "One bar for each gain alone and for the strongest two pairs, in percent of the surface's variance."
+                .to_owned(),
         size: (HALF.0, 68.0 + ROW * rows.len() as f64),
         x: Axis::linear("share of the variance (%)", (0.0, 100.0 * largest), 4),
         y: Axis::rows(rows.into_iter().map(|(name, _)| name)),
@@ -59,10 +67,11 @@ fn map(slice: &Slice) -> Result<String, ReportError> {
     let (x, y) = (axis(&slice.x), axis(&slice.y));
     let mut marks = blocks(slice, &slice.stable, Ink::Goal, 0.2);
     marks.extend(blocks(slice, &slice.certified, Ink::Certified, 0.4));
-    let candidates: Vec<(f64, f64)> = slice.candidates.iter().map(|[x, y]| (*x, *y)).collect();
-    // A grid of equal steps would keep too many at the low end of a logarithmic axis, and lose none there.
-    let points = on_grid(&candidates, x.range(), y.range(), (4000, 4000), MOST_DOTS);
-    marks.push(Mark::Dots { ink: Ink::Candidate, radius: 1.4, opacity: 0.7, points });
+    let log = |(lower, upper): (f64, f64)| (lower.ln(), upper.ln());
+    let candidates: Vec<(f64, f64)> = slice.candidates.iter().map(|[x, y]| (x.ln(), y.ln())).collect();
+    let points = on_grid(&candidates, log(x.range()), log(y.range()), (160, 100), MOST_DOTS);
+    let points = points.into_iter().map(|(x, y)| (x.exp(), y.exp())).collect();
+    marks.push(Mark::Dots { ink: Ink::Candidate, radius: 1.4, opacity: 0.8, points });
     for (ink, [x, y]) in [(Ink::Published, slice.gains.published), (Ink::Tuned, slice.gains.tuned)] {
         marks.push(Mark::Dots { ink, radius: 4.5, opacity: 1.0, points: vec![(x, y)] });
     }
@@ -71,8 +80,11 @@ fn map(slice: &Slice) -> Result<String, ReportError> {
         let set = cells.iter().flatten().filter(|cell| **cell).count();
         format::number(100.0 * set as f64 / all as f64)
     };
-    let certified =
-        if slice.certified.is_empty() { String::new() } else { format!(", certified on {} %", count(&slice.certified)) };
+    let certified = if slice.certified.is_empty() {
+        String::new()
+    } else {
+        format!(", certified on {} %", count(&slice.certified))
+    };
     Plot {
         title: format!("Stability over {} and {}", slice.x.gain, slice.y.gain),
         description: format!(

@@ -134,8 +134,10 @@ fn the_nearest_limit_is_the_one_exceeded_most() {
         outcome: Outcome::Simulated { cost: Finite::saturating(1.0) },
         figures: Figures { overshoot: Some(overshoot), torque_rate_rms_n_m_per_s, ..Figures::default() },
     };
-    let mut verdict =
-        Verdict { outcome: record.evaluations[0].outcome, plants: vec![plant(0.01, Some(19.0)), plant(0.012, Some(3.0))] };
+    let mut verdict = Verdict {
+        outcome: record.evaluations[0].outcome,
+        plants: vec![plant(0.01, Some(19.0)), plant(0.012, Some(3.0))],
+    };
     assert_eq!(nearest_limit(&record, &verdict), Some((Goal::Jitter, 20.0, 19.0)));
     verdict.plants.push(plant(0.0199, None));
     assert_eq!(nearest_limit(&record, &verdict), Some((Goal::Jitter, 20.0, f64::INFINITY)));
