@@ -42,7 +42,7 @@ pub(crate) fn learnt(record: &TuningReport) -> LearntView {
             None if no_surface.is_empty() => "The importance of the gains was not measured.".to_owned(),
             None => format!("The importance of the gains is not known: {no_surface}."),
         },
-        directions: surface.as_ref().map_or_else(Vec::new, directions),
+        directions: surface.as_ref().map_or_else(Vec::new, |surface| directions(surface, &record.search.unit)),
         held_back: held_back(record),
         worst_plants: worst_plants.iter().map(worst_plant).collect(),
         certified: slices.iter().any(|slice| !slice.certified.is_empty()),
@@ -70,7 +70,7 @@ fn worth(surface: &Surface) -> String {
 }
 
 /// The stiffest direction first, then those along which the cost hardly changes, the slackest last.
-fn directions(surface: &Surface) -> Vec<String> {
+fn directions(surface: &Surface, unit: &str) -> Vec<String> {
     let Some(stiffest) = surface.directions.first() else { return Vec::new() };
     let moves = |direction: &Direction| {
         let largest = direction.parts.iter().fold(0.0_f64, |largest, part| largest.max(part.abs()));
@@ -79,13 +79,13 @@ fn directions(surface: &Surface) -> Vec<String> {
         named.map(|(gain, part)| format!("{} {}", gain.gain, way(*part))).collect::<Vec<_>>().join(" with ")
     };
     let stiff =
-        format!("Stiff: {}. A tenth of the range changes the cost by {}.", moves(stiffest), percent(stiffest.change));
+        format!("Stiff: {}. A tenth of the range changes the cost by {}.", moves(stiffest), format::with_unit(stiffest.change, unit));
     let slack = surface.directions.iter().skip(1).filter(|direction| direction.change < SLACK * stiffest.change);
     let slack = slack.map(|direction| {
         format!(
             "Slack: {}. The cost hardly changes: {} for a tenth of the range.",
             moves(direction),
-            percent(direction.change)
+            format::with_unit(direction.change, unit)
         )
     });
     std::iter::once(stiff).chain(slack).collect()
@@ -140,7 +140,7 @@ fn costliest(plants: &[PlantRow]) -> Option<(&PlantRow, f64)> {
 }
 
 fn worst_plant(row: &WorstPlantRow) -> String {
-    format!("{}: candidate {}, the best until then, {}.", format::sentence(&row.in_words), row.candidate, row.outcome)
+    format!("{}. Candidate {}, the best until then: {}.", format::sentence(&row.in_words), row.candidate, row.outcome)
 }
 
 #[cfg(test)]
@@ -156,14 +156,14 @@ mod tests {
     #[test]
     fn a_slack_direction_is_named_and_a_middling_one_is_not() {
         let along = |parts: [f64; 2], change| Direction { parts: parts.to_vec(), change };
-        let said = directions(&surface(vec![along([0.8, -0.6], 0.05), along([0.6, 0.8], 0.001)]));
+        let said = directions(&surface(vec![along([0.8, -0.6], 0.05), along([0.6, 0.8], 0.001)]), "s");
         assert_eq!(
             said[0],
-            "Stiff: kappa_mu up with sigma_mu down. A tenth of the range changes the cost by 5.00\u{a0}%."
+            "Stiff: kappa_mu up with sigma_mu down. A tenth of the range changes the cost by 0.0500\u{a0}s."
         );
         assert!(said[1].starts_with("Slack: kappa_mu up with sigma_mu up. The cost hardly changes"));
-        assert_eq!(directions(&surface(vec![along([1.0, 0.1], 0.05), along([-0.1, 1.0], 0.02)])).len(), 1);
-        assert!(directions(&surface(Vec::new())).is_empty());
+        assert_eq!(directions(&surface(vec![along([1.0, 0.1], 0.05), along([-0.1, 1.0], 0.02)]), "s").len(), 1);
+        assert!(directions(&surface(Vec::new()), "s").is_empty());
     }
 
     #[test]

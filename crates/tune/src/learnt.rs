@@ -35,7 +35,7 @@ const RANK: f64 = 1e-9;
 /// Why nothing can be said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "{points} candidates of one round have a cost, and a quadratic in {knobs} knobs needs at least {needed}: a larger budget would tell"
+    "{points} candidates of one round have a cost, and a quadratic in {knobs} knobs needs at least {needed}; a larger budget would tell"
 )]
 pub struct TooFew {
     /// The most candidates of one round with a cost.

@@ -31,11 +31,9 @@ pub fn learnt(run: &Run, gains: &Pair<Gains>, cost_parts: Vec<CostPart>, slices:
     }
 }
 
-/// The fitted surface, in shares of the lowest cost that it was fitted to.
+/// The fitted surface.
 fn around(record: &RunRecord, gains: &Gains) -> Result<Surface, String> {
     let found = surface(record, gains).map_err(|too_few| too_few.to_string())?;
-    let costs = record.evaluations.iter().filter(|evaluation| evaluation.round == found.round);
-    let least = costs.filter_map(|evaluation| evaluation.outcome.cost()).fold(f64::INFINITY, f64::min);
     let share = |(gain, share)| Share { gain, share };
     Ok(Surface {
         points: found.points as u64,
@@ -48,7 +46,7 @@ fn around(record: &RunRecord, gains: &Gains) -> Result<Surface, String> {
         directions: found
             .directions
             .into_iter()
-            .map(|direction| Direction { parts: direction.parts, change: STEP * direction.slope / least })
+            .map(|direction| Direction { parts: direction.parts, change: STEP * direction.slope })
             .collect(),
     })
 }
@@ -72,18 +70,15 @@ fn figure_in_words(goal: Goal, figure: f64) -> String {
 
 fn worst_plant(record: &RunRecord, found: &WorstPlant) -> WorstPlantRow {
     let objective = record.question.goals.objective;
+    let figure = |cost: f64| format!("{} {}", words(objective), figure_in_words(objective, objective.figure(cost)));
     let outcome = match found.outcome {
-        Outcome::Certified { cost } | Outcome::Simulated { cost } | Outcome::Uncertified { cost } => {
-            format!("costs {:.3} {}", cost.get(), objective.cost_unit())
-        }
-        Outcome::Stopped { cost_above } => format!("costs more than {:.3} {}", cost_above.get(), objective.cost_unit()),
+        Outcome::Certified { cost } | Outcome::Simulated { cost } | Outcome::Uncertified { cost } => figure(cost.get()),
+        Outcome::Stopped { cost_above } => format!("given up as no better than {}", figure(cost_above.get())),
         Outcome::Violates { excess, limit } => {
-            format!("goes beyond its limits by {:.1} %, most of it in {}", 100.0 * excess.get(), words(limit))
+            format!("beyond its limits by {:.1} %, most of it in {}", 100.0 * excess.get(), words(limit))
         }
-        Outcome::Unstable { abscissa_per_s } => {
-            format!("is unstable: its loop grows at {:.3} /s", abscissa_per_s.get())
-        }
-        Outcome::Diverged { at_s } => format!("runs away after {:.2} s", at_s.get()),
+        Outcome::Unstable { abscissa_per_s } => format!("unstable, its loop grows at {:.3} /s", abscissa_per_s.get()),
+        Outcome::Diverged { at_s } => format!("ran away after {:.2} s", at_s.get()),
     };
     WorstPlantRow { candidate: found.evaluation as u64, in_words: in_words(&found.setting), outcome }
 }

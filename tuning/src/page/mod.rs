@@ -247,7 +247,7 @@ fn search(record: &RunRecord) -> SearchRecord {
         let outcome = match evaluation.outcome {
             Outcome::Certified { .. } => "certified",
             Outcome::Simulated { .. } => "simulated, certificate not asked for",
-            Outcome::Stopped { .. } => "given up as no better",
+            Outcome::Stopped { .. } => "given up",
             Outcome::Violates { .. } => "beyond a limit",
             Outcome::Uncertified { .. } => "certificate refused",
             Outcome::Unstable { .. } => "unstable",

@@ -63,7 +63,7 @@ fn map(slice: &Slice) -> Result<String, ReportError> {
     let caption = |axis: &SliceAxis| {
         if axis.unit.is_empty() { axis.gain.clone() } else { format!("{} ({})", axis.gain, axis.unit) }
     };
-    let axis = |axis: &SliceAxis| Axis::log(caption(axis), (axis.lower, axis.upper));
+    let axis = |axis: &SliceAxis| Axis::log_within(caption(axis), (axis.lower, axis.upper));
     let (x, y) = (axis(&slice.x), axis(&slice.y));
     let mut marks = blocks(slice, &slice.stable, Ink::Goal, 0.2);
     marks.extend(blocks(slice, &slice.certified, Ink::Certified, 0.4));

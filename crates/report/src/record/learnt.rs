@@ -70,7 +70,7 @@ pub struct PairShare {
 pub struct Direction {
     /// Part of each gain, in the order of [`Surface::gains`]; of length 1.
     pub parts: Vec<f64>,
-    /// Root mean square of the slope, as a share of the tuned cost, over a tenth of the ranges.
+    /// Root mean square of the change of the cost over a tenth of the ranges, in the unit of the search's costs.
     pub change: f64,
 }
 

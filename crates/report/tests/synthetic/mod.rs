@@ -103,11 +103,11 @@ fn evaluations() -> Vec<Evaluation> {
                 0 => "unstable",
                 1 => "diverged",
                 2 => "uncertified",
-                3 => "given up as no better",
+                3 => "given up",
                 4 => "beyond a limit",
                 _ => "certified",
             };
-            let lost = matches!(outcome, "unstable" | "diverged" | "given up as no better" | "beyond a limit");
+            let lost = matches!(outcome, "unstable" | "diverged" | "given up" | "beyond a limit");
             if outcome == "certified" {
                 best = Some(best.map_or(cost, |best: f64| best.min(cost)));
             }
@@ -175,7 +175,7 @@ fn learnt() -> Learnt {
         worst_plants: vec![WorstPlantRow {
             candidate: 211,
             in_words: "payload 0.70 kg, link masses +20 % on average, friction 2.00 N m s/rad on average".to_owned(),
-            outcome: "costs 2.41 s".to_owned(),
+            outcome: "settling time 2.41 s".to_owned(),
         }],
         slices: vec![
             slice(axis("kappa_a", "N m/(rad s)", 50.0, 20_000.0), axis("sigma_dq", "", 0.2, 5.0)),
