@@ -78,8 +78,11 @@ fn directions(surface: &Surface, unit: &str) -> Vec<String> {
         let way = |part: f64| if part > 0.0 { "up" } else { "down" };
         named.map(|(gain, part)| format!("{} {}", gain.gain, way(*part))).collect::<Vec<_>>().join(" with ")
     };
-    let stiff =
-        format!("Stiff: {}. A tenth of the range changes the cost by {}.", moves(stiffest), format::with_unit(stiffest.change, unit));
+    let stiff = format!(
+        "Stiff: {}. A tenth of the range changes the cost by {}.",
+        moves(stiffest),
+        format::with_unit(stiffest.change, unit)
+    );
     let slack = surface.directions.iter().skip(1).filter(|direction| direction.change < SLACK * stiffest.change);
     let slack = slack.map(|direction| {
         format!(

@@ -152,7 +152,7 @@ fn what_was_learnt_is_said_and_drawn() {
         "lag 97.2\u{a0}%, jitter 1.80\u{a0}%",
         "Candidate 211, the best until then: settling time 2.41 s.",
         "Stability over kappa_a and sigma_dq",
-        "is certified for the whole box",
+        "exact arithmetic finds that every linearised loop of the whole box of arms decays",
     ] {
         assert!(learnt.contains(expected), "{expected}");
     }
@@ -171,7 +171,7 @@ fn what_is_not_known_is_not_drawn() {
     let html = page(&record);
     let learnt = section(&html, "learnt");
     assert!(learnt.contains("The importance of the gains is not known: 12 candidates of one round have a cost."));
-    assert!(!learnt.contains("The worst arms") && !learnt.contains("certified") && !learnt.contains("Stiff"));
+    assert!(!learnt.contains("The worst arms") && !learnt.contains("exact arithmetic") && !learnt.contains("Stiff"));
     record.learnt = certune_report::Learnt::default();
     let html = page(&record);
     assert!(section(&html, "learnt").contains("was not measured") && !section(&html, "learnt").contains("<svg"));
