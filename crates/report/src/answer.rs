@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::claims::{self, Tone};
 use crate::format;
-use crate::record::{PlantRow, RegionRecord, SegmentMetrics, SegmentRow, TuningReport, Verdict};
+use crate::record::{GainRow, PlantRow, RegionRecord, SegmentMetrics, SegmentRow, TuningReport, Verdict};
 
 /// The first screen.
 #[derive(Debug, Serialize)]
@@ -129,12 +129,7 @@ fn warnings(record: &TuningReport) -> Vec<String> {
         let count = record.held_out.plants.len();
         warnings.push(format!("With the tuned gains, {lost} of {count} held-out arms did not finish the task."));
     }
-    let on_bound: Vec<_> = record
-        .gains
-        .iter()
-        .filter(|gain| gain.bounds.as_ref().is_some_and(|bounds| bounds.on_bound))
-        .map(|gain| gain.joint.as_ref().map_or_else(|| gain.name.clone(), |joint| format!("{} of {joint}", gain.name)))
-        .collect();
+    let on_bound = on_bound(&record.gains);
     if !on_bound.is_empty() {
         warnings
             .push(format!("On the edge of the search space: {}. A wider space might do better.", on_bound.join(", ")));
@@ -154,6 +149,15 @@ fn warnings(record: &TuningReport) -> Vec<String> {
         }
     }
     warnings
+}
+
+/// The gains whose tuned value lies on a bound of the search.
+pub(crate) fn on_bound(gains: &[GainRow]) -> Vec<String> {
+    let on_bound = gains.iter().filter(|gain| gain.bounds.as_ref().is_some_and(|bounds| bounds.on_bound));
+    let name = |gain: &GainRow| {
+        gain.joint.as_ref().map_or_else(|| gain.name.clone(), |joint| format!("{} of {joint}", gain.name))
+    };
+    on_bound.map(name).collect()
 }
 
 fn tiles(record: &TuningReport, settling: (Option<f64>, Option<f64>), tally: &Tally) -> Vec<Tile> {

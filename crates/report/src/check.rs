@@ -20,6 +20,20 @@ pub(crate) fn check(record: &TuningReport) -> Result<(), ReportError> {
     for band in [&record.held_out.bands.published, &record.held_out.bands.tuned] {
         bands(band)?;
     }
+    for slice in &record.learnt.slices {
+        for (series, cells) in [("learnt.slices.stable", &slice.stable), ("learnt.slices.certified", &slice.certified)]
+        {
+            let columns = cells.first().map_or(0, Vec::len);
+            cells.iter().try_for_each(|row| length(series, columns, row.len()))?;
+        }
+    }
+    if let Some(surface) = &record.learnt.surface {
+        let gains = surface.gains.len();
+        surface
+            .directions
+            .iter()
+            .try_for_each(|one| length("learnt.surface.directions.parts", gains, one.parts.len()))?;
+    }
     for (index, claim) in record.certificate.claims.iter().enumerate() {
         let short_of_proof = claims::worth(claim) < Grade::Proved;
         if claim.verdict == Verdict::Holds && short_of_proof && claim.statement.to_lowercase().contains("proved") {

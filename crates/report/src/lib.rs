@@ -9,6 +9,7 @@
 //! | `check`   | what a record must satisfy before it is shown                    |
 //! | `answer`  | the first screen in words                                        |
 //! | `claims`  | claims, verdicts and grades in words                             |
+//! | `learnt`  | what the candidates say together, in words                       |
 //! | `panels`  | one figure after the other                                       |
 //! | `figure`  | axes, marks and labels over plotters' SVG backend                |
 //! | `front`   | the page of a front of several goals                             |
@@ -27,6 +28,7 @@ mod error;
 mod figure;
 mod format;
 mod front;
+mod learnt;
 mod page;
 mod panels;
 mod record;

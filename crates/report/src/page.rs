@@ -9,6 +9,7 @@ use crate::answer::{self, Answer, SummaryRow};
 use crate::claims::{self, AssumptionView, ClaimView};
 use crate::error::ReportError;
 use crate::format;
+use crate::learnt::{self, LearntView};
 use crate::panels::Panels;
 use crate::record::{Asked, CommandLine, Evaluation, GainRow, Pair, PlantRow, SegmentRow, TuningReport, Version};
 
@@ -28,6 +29,7 @@ struct Page<'a> {
     plants: &'a [PlantRow],
     summary: Vec<SummaryRow>,
     outcomes: Vec<OutcomeCount<'a>>,
+    learnt: LearntView,
     certificate: Certificate<'a>,
     recheck: &'a [CommandLine],
     method: &'a [String],
@@ -100,6 +102,7 @@ pub(crate) fn render(record: &TuningReport) -> Result<String, ReportError> {
         plants: &record.held_out.plants,
         summary: answer::summary(&record.held_out.plants),
         outcomes: outcomes(&record.search.evaluations),
+        learnt: learnt::learnt(record),
         certificate: Certificate {
             file_name: &record.certificate.file_name,
             sha256: &record.certificate.sha256,

@@ -8,6 +8,10 @@
 
 use serde::{Deserialize, Serialize};
 
+mod learnt;
+
+pub use learnt::*;
+
 /// One tuning run: what was asked, what came out, and the evidence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -26,6 +30,8 @@ pub struct TuningReport {
     pub search: SearchRecord,
     /// What a small change of one gain does to the cost.
     pub sensitivity: Vec<SensitivityRow>,
+    /// What the candidates say together.
+    pub learnt: Learnt,
     /// Claims about stability, with their evidence.
     pub certificate: CertificateRecord,
     /// Commands with which a reader checks the result.

@@ -6,8 +6,19 @@ mod synthetic;
 
 use certune_report::{Grade, ReportError, TuningReport, Verdict, tuning_report};
 
-const SECTIONS: [&str; 10] =
-    ["answer", "asked", "gains", "response", "held-out", "search", "sensitivity", "certificate", "recheck", "method"];
+const SECTIONS: [&str; 11] = [
+    "answer",
+    "asked",
+    "gains",
+    "response",
+    "held-out",
+    "search",
+    "sensitivity",
+    "learnt",
+    "certificate",
+    "recheck",
+    "method",
+];
 
 /// Elements that have no end tag.
 const VOID: [&str; 2] = ["meta", "br"];
@@ -83,8 +94,9 @@ fn the_page_is_complete_small_and_loads_nothing() {
     for outside in ["http", "//", "<script", "<link", "<img", "url(", "@import"] {
         assert!(!html.contains(outside), "{outside}");
     }
-    // Seven angles, seven torques; free energy and search twice; two of held-out; sensitivity; two pole maps; region.
-    assert_eq!(html.matches("<svg ").count(), 7 + 7 + 2 * 2 + 2 + 1 + 2 + 1);
+    // Seven angles, seven torques; free energy and search twice; two of held-out; sensitivity; shares and two maps; two pole maps;
+    // region.
+    assert_eq!(html.matches("<svg ").count(), 7 + 7 + 2 * 2 + 2 + 1 + 3 + 2 + 1);
     assert_eq!(html.matches("<svg ").count(), html.matches("role=\"img\" aria-label=\"").count());
     assert_eq!(html.matches("<h1>").count(), 1);
 }
@@ -108,6 +120,72 @@ fn the_answer_comes_first_and_says_what_it_rests_on() {
         1,
         "a shared assumption is listed once"
     );
+}
+
+fn section<'a>(html: &'a str, id: &str) -> &'a str {
+    let after = html.split_once(&format!("<section id=\"{id}\"")).unwrap().1;
+    after.split_once("</section>").unwrap().0
+}
+
+#[test]
+fn candidates_without_a_cost_are_told_apart() {
+    let html = page(&synthetic::record());
+    let search = words(section(&html, "search"));
+    for outcome in ["given up", "beyond a limit", "unstable", "diverged"] {
+        // In the sentence above the figure, and beside its lane in both widths.
+        assert_eq!(search.matches(outcome).count(), 3, "{outcome}");
+    }
+    assert_eq!(search.matches("uncertified").count(), 1, "it has a cost, so it has a dot");
+}
+
+#[test]
+fn what_was_learnt_is_said_and_drawn() {
+    let html = page(&synthetic::record());
+    let learnt = section(&html, "learnt").replace("&#x2f;", "/");
+    for expected in [
+        "84 candidates nearest to the tuned gains, up to 21.0\u{a0}% of each range away: 21 coefficients, R² 0.964, and 0.911",
+        "Stiff: kappa_mu up with sigma_mu down. A tenth of the range changes the cost by 0.0520\u{a0}s.",
+        "Slack: kappa_mu up with sigma_mu up. The cost hardly changes: 0.00100\u{a0}s",
+        "kappa_mu with sigma_mu",
+        "On a bound of the search: kappa_a.",
+        "The worst held-out arm reaches 18.4 N m/s, 2.10\u{a0}% inside: this limit holds the gains back.",
+        "lag 97.2\u{a0}%, jitter 1.80\u{a0}%",
+        "Candidate 211, the best until then: settling time 2.41 s.",
+        "Stability over kappa_a and sigma_dq",
+        "exact arithmetic finds that every linearised loop of the whole box of arms decays",
+    ] {
+        assert!(learnt.contains(expected), "{expected}");
+    }
+    assert!(!learnt.contains("kappa_a with kappa_mu"), "two pairs are enough");
+    assert!(!learnt.contains("kappa_a up with sigma_dq up"), "neither stiff nor slack");
+}
+
+#[test]
+fn what_is_not_known_is_not_drawn() {
+    let mut record = synthetic::record();
+    record.learnt.surface = None;
+    record.learnt.no_surface = "12 candidates of one round have a cost".to_owned();
+    record.learnt.worst_plants.clear();
+    record.learnt.slices[0].certified.clear();
+    record.learnt.slices.truncate(1);
+    let html = page(&record);
+    let learnt = section(&html, "learnt");
+    assert!(learnt.contains("The importance of the gains is not known: 12 candidates of one round have a cost."));
+    assert!(!learnt.contains("The worst arms") && !learnt.contains("exact arithmetic") && !learnt.contains("Stiff"));
+    record.learnt = certune_report::Learnt::default();
+    let html = page(&record);
+    assert!(section(&html, "learnt").contains("was not measured") && !section(&html, "learnt").contains("<svg"));
+}
+
+#[test]
+fn a_map_whose_rows_differ_is_refused() {
+    let mut record = synthetic::record();
+    record.learnt.slices[1].stable[3].pop();
+    let error = tuning_report(&record).unwrap_err();
+    assert_eq!(error.to_string(), "learnt.slices.stable: expected 24 entries, found 23");
+    let mut record = synthetic::record();
+    record.learnt.surface.as_mut().unwrap().directions[0].parts.pop();
+    assert!(matches!(tuning_report(&record), Err(ReportError::Length { expected: 5, found: 4, .. })));
 }
 
 #[test]
@@ -185,6 +263,11 @@ fn names_are_text_and_never_markup() {
     record.search.evaluations[0].outcome = evil.to_owned();
     record.certificate.claims[0].statement = evil.to_owned();
     record.certificate.claims[0].kind = evil.to_owned();
+    if let Some(surface) = &mut record.learnt.surface {
+        surface.gains[0].gain = evil.to_owned();
+    }
+    record.learnt.worst_plants[0].in_words = evil.to_owned();
+    record.learnt.slices[0].x.gain = evil.to_owned();
     if let Some(region) = &mut record.certificate.region {
         region.steps[0].label = evil.to_owned();
     }

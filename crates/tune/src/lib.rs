@@ -10,6 +10,7 @@ mod checked;
 pub mod filter;
 pub mod front;
 pub mod goals;
+pub mod learnt;
 pub mod outcome;
 pub mod record;
 pub mod score;
@@ -23,6 +24,7 @@ pub use batch::{Batch, BatchError, Prover, SimulatedObjective};
 pub use certune_closed_loop::Gains;
 pub use filter::StabilityFilter;
 pub use goals::{Bound, Excess, Goal, GoalError, Goals, Limit, Reference, Source};
+pub use learnt::{Direction, Surface, TooFew};
 pub use outcome::{Finite, NotFinite, Outcome};
 pub use record::{
     Attempt, Figures, HeldOut, PlantResult, Question, RunRecord, Sensitivity, SpaceRecord, Verdict, WorstPlant,

@@ -106,7 +106,7 @@ impl Ord for Finite {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "rank", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Outcome {
-    /// A certificate holds (and it was simulated on every plant of the batch, when the objective is the settling cost).
+    /// A certificate holds (and it was simulated on every plant of the batch, when the objective or a limit is about runs).
     Certified {
         /// Cost, in the unit of the run's objective: s for the settling cost.
         cost: Finite,

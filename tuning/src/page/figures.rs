@@ -8,7 +8,7 @@ use crate::output::number;
 /// The worst of each figure over the plants; a figure that a plant does not have is missing.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// Mean cost of the worse half of the plants, as in the search.
+    /// Cost of all plants together, as in the search: the mean over the worst share of them.
     pub cost_s: Option<f64>,
     pub worst_cost_s: Option<f64>,
     pub settling_time_s: Option<f64>,

@@ -5,6 +5,8 @@
 
 mod evidence;
 mod figures;
+mod learnt;
+mod maps;
 mod runs;
 
 use certune::closed_loop::{Gains, PlantBox};
@@ -39,6 +41,7 @@ pub fn page<const N: usize>(run: &Run, robot: &Robot, robot_argument: &str, fold
         held_out: runs.held_out,
         search: search(record),
         sensitivity: sensitivity(record),
+        learnt: learnt::learnt(run, &gains, runs.cost_parts, maps::slices::<N>(run, robot, &gains)?),
         certificate: evidence::evidence::<N>(run, robot, &gains)?,
         recheck: recheck(run, robot_argument, folder, certified),
         method: method(run, certified),
@@ -244,7 +247,7 @@ fn search(record: &RunRecord) -> SearchRecord {
         let outcome = match evaluation.outcome {
             Outcome::Certified { .. } => "certified",
             Outcome::Simulated { .. } => "simulated, certificate not asked for",
-            Outcome::Stopped { .. } => "given up as no better",
+            Outcome::Stopped { .. } => "given up",
             Outcome::Violates { .. } => "beyond a limit",
             Outcome::Uncertified { .. } => "certificate refused",
             Outcome::Unstable { .. } => "unstable",

@@ -7,9 +7,12 @@ use certune::control::Controller;
 use certune::control::aic::{Aic, AicParams, AicState};
 use certune::control::mrac::{Mrac, MracParams};
 use certune::dynamics::{Joints, Robot};
-use certune::report::{Bands, HeldOut, Pair, PlantRow, Response, SegmentMetrics, SegmentRow, Trajectory as Curves};
+use certune::report::{
+    Bands, CostPart, HeldOut, Pair, PlantRow, Response, SegmentMetrics, SegmentRow, Trajectory as Curves,
+};
+use certune::tune::score::Parts;
 use certune::tune::streams::FIRST_HELD_OUT_PLANT;
-use certune::tune::{Batch, PlantResult, Verdict};
+use certune::tune::{Batch, Goal, PlantResult, Verdict};
 use certune::{ArmGains, StabilityError};
 use rayon::prelude::*;
 
@@ -26,6 +29,8 @@ pub struct Runs {
     pub response: Response,
     pub segments: Vec<SegmentRow>,
     pub held_out: HeldOut,
+    /// Parts of the tuned gains' cost on the nominal plant; none for a cost that is one figure.
+    pub cost_parts: Vec<CostPart>,
 }
 
 /// One plant in the middle of a box.
@@ -79,6 +84,10 @@ pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Re
             },
             runs: Pair { published, tuned },
         },
+        cost_parts: match goals.objective {
+            Goal::SettlingCost => cost_parts(&tuned_metrics, batch.task()),
+            _ => Vec::new(),
+        },
         segments: segments(&published_metrics, &tuned_metrics),
         held_out: HeldOut {
             plants: plants
@@ -91,6 +100,25 @@ pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Re
             bands: Pair { published: published_bands, tuned: tuned_bands },
         },
     })
+}
+
+/// The parts of the settling cost over the moves of a run, as shares; none of a run that ran away.
+fn cost_parts<const N: usize>(metrics: &Metrics, task: &Task<N>) -> Vec<CostPart> {
+    if metrics.diverged_at_s.is_some() {
+        return Vec::new();
+    }
+    let mut previous: Vec<f64> = task.start.iter().copied().collect();
+    let mut sums = [("lag", 0.0), ("jitter", 0.0), ("overshoot", 0.0), ("torque limits", 0.0)];
+    for segment in &metrics.segments {
+        let Parts { lag_s, jitter_s, overshoot_s, saturation_s } = Parts::of(segment, &previous, task.step_s);
+        for ((_, sum), part_s) in sums.iter_mut().zip([lag_s, jitter_s, overshoot_s, saturation_s]) {
+            *sum += part_s;
+        }
+        previous.clone_from(&segment.goal_rad);
+    }
+    let total: f64 = sums.iter().map(|(_, sum)| sum).sum();
+    let shares = sums.into_iter().filter(|(_, sum)| *sum > 0.0);
+    shares.map(|(name, sum)| CostPart { name: name.to_owned(), share: sum / total }).collect()
 }
 
 /// The costs that a verdict holds.
@@ -218,7 +246,7 @@ fn quantile(sorted: &[f64], part: f64) -> f64 {
 }
 
 /// A plant in a few words.
-fn in_words(plant: &PlantSetting) -> String {
+pub fn in_words(plant: &PlantSetting) -> String {
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     format!(
         "payload {:.2} kg, link masses {:+.0} % on average, friction {:.2} N m s/rad on average",

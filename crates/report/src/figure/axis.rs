@@ -45,7 +45,11 @@ impl Axis {
         let upper = if upper > 0.0 { upper } else { 1.0 };
         let lower = if lower > 0.0 && lower < upper { lower } else { upper * 1e-6 };
         let margin = (upper / lower).powf(0.05).max(1.1);
-        let (lower, upper) = (lower / margin, upper * margin);
+        Self::log_within(caption, (lower / margin, upper * margin))
+    }
+
+    /// [`Axis::log`] without a margin, for a map that fills its frame; `0 < lower < upper`.
+    pub(crate) fn log_within(caption: impl Into<String>, (lower, upper): (f64, f64)) -> Self {
         let (first, last) = (lower.log10().floor() as i32, upper.log10().ceil() as i32);
         let stride = ((last - first) / 6 + 1) as usize;
         let plain = lower.log10().ceil() >= -3.0 && upper.log10().floor() <= 4.0;

@@ -5,6 +5,7 @@
 
 mod certificate;
 mod held_out;
+mod learnt;
 mod response;
 mod search;
 mod sensitivity;
@@ -55,6 +56,10 @@ pub(crate) struct Panels {
     pub(crate) search: Option<TwoWidths>,
     /// Cost against single gains.
     pub(crate) sensitivity: Option<String>,
+    /// Share of each gain in the cost.
+    pub(crate) shares: Option<String>,
+    /// Where loops are stable.
+    pub(crate) maps: Vec<String>,
     /// All poles, and those near the imaginary axis.
     pub(crate) poles: Vec<String>,
     /// Certified radius against the moves.
@@ -75,6 +80,8 @@ impl Panels {
             plants: held_out::plants(record)?,
             search: search::convergence(record)?,
             sensitivity: sensitivity::bars(record)?,
+            shares: learnt::shares(&record.learnt)?,
+            maps: learnt::maps(&record.learnt)?,
             poles: certificate::poles(&record.certificate)?,
             region: certificate::region(&record.certificate)?,
         })

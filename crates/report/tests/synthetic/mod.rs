@@ -103,9 +103,11 @@ fn evaluations() -> Vec<Evaluation> {
                 0 => "unstable",
                 1 => "diverged",
                 2 => "uncertified",
+                3 => "given up",
+                4 => "beyond a limit",
                 _ => "certified",
             };
-            let lost = matches!(outcome, "unstable" | "diverged");
+            let lost = matches!(outcome, "unstable" | "diverged" | "given up" | "beyond a limit");
             if outcome == "certified" {
                 best = Some(best.map_or(cost, |best: f64| best.min(cost)));
             }
@@ -119,6 +121,67 @@ fn evaluations() -> Vec<Evaluation> {
             }
         })
         .collect()
+}
+
+fn learnt() -> Learnt {
+    let names = ["kappa_mu", "kappa_a", "sigma_dq", "sigma_mu", "sigma_dmu"];
+    let axis =
+        |gain: &str, unit: &str, lower, upper| SliceAxis { gain: gain.to_owned(), unit: unit.to_owned(), lower, upper };
+    let slice = |x: SliceAxis, y: SliceAxis| {
+        // The loop needs damping: what lies above a falling line is stable, a strip less of it is certified.
+        let cells = |count: usize, edge: f64| -> Vec<Vec<bool>> {
+            let at = |index: usize| (index as f64 + 0.5) / count as f64;
+            (0..count).map(|row| (0..count).map(|column| at(row) + 0.5 * at(column) > edge).collect()).collect()
+        };
+        let inside = |axis: &SliceAxis, part: f64| axis.lower * (axis.upper / axis.lower).powf(part);
+        let candidates = (0..300).map(|k| [inside(&x, noise(k)), inside(&y, noise(k + 300))]).collect();
+        let gains = Pair { published: [inside(&x, 0.5), inside(&y, 0.5)], tuned: [inside(&x, 0.9), inside(&y, 0.4)] };
+        Slice { stable: cells(24, 0.3), certified: cells(12, 0.6), candidates, gains, x, y }
+    };
+    Learnt {
+        surface: Some(Surface {
+            points: 84,
+            coefficients: 21,
+            reach: 0.21,
+            r_squared: 0.964,
+            predicted_r_squared: 0.911,
+            gains: names
+                .iter()
+                .zip([0.31, 0.08, 0.12, 0.35, 0.02])
+                .map(|(gain, share)| Share { gain: (*gain).to_owned(), share })
+                .collect(),
+            pairs: [
+                (["kappa_mu", "sigma_mu"], 0.1),
+                (["kappa_a", "sigma_dq"], 0.015),
+                (["kappa_a", "kappa_mu"], 0.005),
+            ]
+            .map(|(gains, share)| PairShare { gains: gains.map(str::to_owned), share })
+            .to_vec(),
+            directions: vec![
+                Direction { parts: vec![0.7, 0.1, 0.0, -0.7, 0.0], change: 0.052 },
+                Direction { parts: vec![0.0, 0.8, 0.6, 0.0, 0.0], change: 0.02 },
+                Direction { parts: vec![0.7, 0.0, 0.1, 0.7, 0.0], change: 0.001 },
+            ],
+        }),
+        no_surface: String::new(),
+        limit: Some(NearestLimit {
+            in_words: "jitter at most 18.8 N m/s".to_owned(),
+            figure_in_words: "18.4 N m/s".to_owned(),
+            excess: Some(-0.021),
+        }),
+        cost_parts: [("lag", 0.972), ("jitter", 0.018), ("overshoot", 0.01)]
+            .map(|(name, share)| CostPart { name: name.to_owned(), share })
+            .to_vec(),
+        worst_plants: vec![WorstPlantRow {
+            candidate: 211,
+            in_words: "payload 0.70 kg, link masses +20 % on average, friction 2.00 N m s/rad on average".to_owned(),
+            outcome: "settling time 2.41 s".to_owned(),
+        }],
+        slices: vec![
+            slice(axis("kappa_a", "N m/(rad s)", 50.0, 20_000.0), axis("sigma_dq", "", 0.2, 5.0)),
+            slice(axis("kappa_mu", "1/s", 2.0, 60.0), axis("sigma_mu", "", 0.5, 50.0)),
+        ],
+    }
 }
 
 fn gain(name: &str, unit: &str, (published, tuned): (f64, f64), bounds: Option<(f64, f64, bool)>) -> GainRow {
@@ -254,6 +317,7 @@ pub fn record() -> TuningReport {
                 ratio_at_plus_10_percent: Some(plus),
             })
             .to_vec(),
+        learnt: learnt(),
         certificate: CertificateRecord {
             file_name: "certificate.json".to_owned(),
             sha256: "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08".to_owned(),

@@ -131,7 +131,8 @@ pub struct Range {
 }
 
 impl Range {
-    fn decode(&self, x: f64) -> f64 {
+    /// The value at a coordinate, which is folded back into `[0, 1]`; rounded to five significant digits.
+    pub fn decode(&self, x: f64) -> f64 {
         let x = folded(x);
         let value = match self.scale {
             Scale::Log => (self.lower.ln() + x * (self.upper.ln() - self.lower.ln())).exp(),
@@ -198,6 +199,18 @@ impl Knob {
             Some((first, rest)) if rest.iter().all(|value| value.to_bits() == first.to_bits()) => *first,
             _ => (values.iter().map(|value| value.ln()).sum::<f64>() / values.len() as f64).exp(),
         }
+    }
+
+    /// The coordinate at which the knob is nearest to `gains`.
+    pub(crate) fn place(&self, gains: &Gains) -> f64 {
+        self.range.encode(self.value(gains))
+    }
+
+    /// `gains` with every number of the knob as its `value` has it.
+    #[must_use]
+    pub fn at(&self, gains: Gains, value: f64) -> Gains {
+        // A bound may have more digits, and stays what it is.
+        self.set(gains, |_, unit| if (unit - 1.0).abs() > 0.0 { rounded(value * unit) } else { value })
     }
 
     /// `gains` with every number of the knob set anew, from the old number and what one unit puts there.
@@ -291,15 +304,13 @@ impl Space {
     pub fn decode(&self, point: &[f64]) -> Gains {
         let mut coordinates = point.iter().copied();
         self.knobs.iter().fold(self.fixed.clone(), |gains, knob| {
-            let value = knob.range.decode(coordinates.next().unwrap_or(0.0));
-            // A bound may have more digits, and stays what it is.
-            knob.set(gains, |_, unit| if (unit - 1.0).abs() > 0.0 { rounded(value * unit) } else { value })
+            knob.at(gains, knob.range.decode(coordinates.next().unwrap_or(0.0)))
         })
     }
 
     /// The nearest point to `gains`; for those of the space the inverse of [`Space::decode`] up to the rounding of the gains.
     pub fn encode(&self, gains: &Gains) -> Vec<f64> {
-        self.knobs.iter().map(|knob| knob.range.encode(knob.value(gains))).collect()
+        self.knobs.iter().map(|knob| knob.place(gains)).collect()
     }
 
     /// `gains` as the space writes them: the same control law of an AIC in the scale of the fixed `sigma_q`, the gains of an MRAC under the space's law.
