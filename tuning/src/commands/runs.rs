@@ -46,7 +46,7 @@ struct Row {
     candidates: usize,
     budget: usize,
     /// The tuned gains on held-out plants, s.
-    held_out_cost_s: Option<f64>,
+    held_out_cost: Option<f64>,
     state: State,
 }
 
@@ -86,7 +86,7 @@ fn folders(dir: &Path) -> std::io::Result<Vec<Folder>> {
 
 /// The run in a folder; none when there is none.
 fn row(folder: &Folder) -> Result<Option<Row>, Error> {
-    let row = |controller: String, question: &Question, candidates, held_out_cost_s, state| Row {
+    let row = |controller: String, question: &Question, candidates, held_out_cost, state| Row {
         name: folder.path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         robot: question.robot.clone(),
         controller,
@@ -94,7 +94,7 @@ fn row(folder: &Folder) -> Result<Option<Row>, Error> {
         seed: question.search.seed,
         candidates,
         budget: question.search.evaluations,
-        held_out_cost_s,
+        held_out_cost,
         state,
     };
     if folder.journal().exists() {
@@ -108,8 +108,8 @@ fn row(folder: &Folder) -> Result<Option<Row>, Error> {
     }
     let RunFile { controller, record, .. } = RunFile::parse(&path, &output::read_file(&path)?)?;
     let state = if record.winner.is_some() { State::Certified } else { State::NotCertified };
-    let cost_s = record.held_out.tuned.as_ref().and_then(|tuned| tuned.outcome.cost());
-    Ok(Some(row(controller, &record.question, record.evaluations.len(), cost_s, state)))
+    let cost = record.held_out.tuned.as_ref().and_then(|tuned| tuned.outcome.cost());
+    Ok(Some(row(controller, &record.question, record.evaluations.len(), cost, state)))
 }
 
 fn in_words(rows: &[Row]) -> String {
@@ -126,7 +126,7 @@ fn in_words(rows: &[Row]) -> String {
             row.objective.to_owned(),
             row.seed.to_string(),
             candidates,
-            number(row.held_out_cost_s, 4),
+            number(row.held_out_cost, 4),
             row.state.in_words().to_owned(),
         ]
     };

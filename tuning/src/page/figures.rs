@@ -9,8 +9,8 @@ use crate::output::number;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Spread {
     /// Cost of all plants together, as in the search: the mean over the worst share of them.
-    pub cost_s: Option<f64>,
-    pub worst_cost_s: Option<f64>,
+    pub cost: Option<f64>,
+    pub worst_cost: Option<f64>,
     pub settling_time_s: Option<f64>,
     pub final_error_rad: Option<f64>,
     pub overshoot: Option<f64>,
@@ -31,8 +31,8 @@ pub struct Figure {
 
 /// The rows, in the order of a table.
 pub const FIGURES: [Figure; 7] = [
-    Figure { name: "cost, tail of the plants", digits: 4, scale: 1.0, value: |spread| spread.cost_s },
-    Figure { name: "cost, worst plant", digits: 4, scale: 1.0, value: |spread| spread.worst_cost_s },
+    Figure { name: "cost, tail of the plants", digits: 4, scale: 1.0, value: |spread| spread.cost },
+    Figure { name: "cost, worst plant", digits: 4, scale: 1.0, value: |spread| spread.worst_cost },
     Figure { name: "slowest move settles in, s", digits: 3, scale: 1.0, value: |spread| spread.settling_time_s },
     Figure { name: "largest final error, mrad", digits: 3, scale: 1e3, value: |spread| spread.final_error_rad },
     Figure { name: "largest overshoot, %", digits: 2, scale: 1e2, value: |spread| spread.overshoot },
@@ -64,8 +64,8 @@ pub fn spread(verdict: &Verdict) -> Spread {
     };
     let figure = |value: fn(&Figures) -> Option<f64>| worst(&|plant: &PlantResult| value(&plant.figures));
     Spread {
-        cost_s: verdict.outcome.cost(),
-        worst_cost_s: worst(&|plant| plant.outcome.cost()),
+        cost: verdict.outcome.cost(),
+        worst_cost: worst(&|plant| plant.outcome.cost()),
         settling_time_s: figure(|figures| figures.settling_time_s),
         final_error_rad: figure(|figures| figures.final_error_rad),
         overshoot: figure(|figures| figures.overshoot),

@@ -48,7 +48,7 @@ fn prepare(folder: &Path) {
     write("space-twice.toml", &SPACE.replace("[fixed]", "[fixed]\nkappa_mu = 3.0"));
     write("space-start.toml", &SPACE.replace("lower = 50.0", "lower = 5000.0"));
     write("space-cold.toml", &SPACE.replace("start = \"pezzato2020-simulation\"", "start = \"cold\""));
-    write("space-objective.toml", &SPACE.replace("[search]", "[search]\nobjective = \"fastest\""));
+    write("space-objective.toml", &SPACE.replace("objective = \"settling-time\"", "objective = \"fastest\""));
     write("nolimit.urdf", NO_LIMIT);
     write("space-preset.toml", &SPACE.replace("pezzato2020-simulation", "pezato2020-simulation"));
     std::fs::create_dir(folder.join("folder")).unwrap();
@@ -101,7 +101,11 @@ const CASES: &[(&str, i32, &[&str])] = &[
     ("--robot panda --plants few", 1, &["few", "--plants"]),
     ("--robot panda --controller pid", 1, &["pid", "aic"]),
     ("--robot panda --controller mrac --space panda-aic", 1, &["--controller mrac", "holds gains for `aic`"]),
-    ("--robot panda --controller mrac --objective certified-rate", 1, &["certified-rate", "settling-cost"]),
+    (
+        "--robot panda --controller mrac --objective certified-rate",
+        1,
+        &["certified-rate is no goal", "another --objective"],
+    ),
     ("ask-tell --space panda-mrac", 1, &["panda-mrac", "gains.alpha1_arm", "name the robot"]),
     ("verify", 1, &["CERTIFICATE.json"]),
     ("certify --robot panda", 1, &["--gains"]),
@@ -148,6 +152,10 @@ const CASES: &[(&str, i32, &[&str])] = &[
     ("constants --robot panda --payload -1 --out x.json", 1, &["zero or above"]),
     ("constants --robot panda --effort endless --out x.json", 1, &["endless", "quick", "thorough"]),
     ("verify whole.json --robot body.urdf", 1, &["--full"]),
+    ("front --robot panda --goals jitter", 1, &["2 or 3 different goals, got 1", "try: --goals"]),
+    ("front --robot panda --goals jitter,jitter", 1, &["2 or 3 different goals"]),
+    ("front --robot panda --goals jitter,enrgy", 1, &["did you mean `energy`?"]),
+    ("pick . --point 1", 1, &["front.json"]),
     ("--robot panda --objective certified-radus", 1, &["did you mean `certified-radius`?"]),
     ("--robot panda --space space-objective.toml", 1, &["space-objective.toml:", "fastest"]),
     ("certify --robot panda --gains pezzato2020-simulation --friction 3..1", 1, &["3 is above 1"]),

@@ -7,5 +7,6 @@ mod bad_input;
 mod commands;
 mod common;
 mod evaluate;
+mod front;
 mod resume;
 mod tune;

@@ -226,7 +226,7 @@ fn runs_are_listed_and_compared() {
         serde_json::from_str(&std::fs::read_to_string(folder.path().join("list/two/run.json")).unwrap()).unwrap();
     let winner = record["winner"].as_u64().unwrap() as usize;
     assert_eq!(compared["gains"]["kappa_a"][1], record["evaluations"][winner]["gains"]["kappa_a"]);
-    assert_eq!(compared["held_out"][1]["cost_s"], listed[1]["held_out_cost_s"]);
+    assert_eq!(compared["held_out"][1]["cost"], listed[1]["held_out_cost"]);
     let text = stdout(folder.path(), "diff list/one list/two", 0);
     assert!(text.contains("question.search.seed") && text.contains("kappa_a") && text.contains("overshoot"), "{text}");
     assert!(stdout(folder.path(), "diff list/one list/one", 0).contains("the same was asked"));
