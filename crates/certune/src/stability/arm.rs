@@ -108,8 +108,10 @@ impl<const N: usize> ArmCertifier<N> {
         halvings: u32,
     ) -> Result<Enclosure<N>, BoundsError> {
         let known = || self.enclosures.lock().unwrap_or_else(PoisonError::into_inner);
+        // To the bit: the box is the same one.
+        let equal = |a: &[f64; N], b: &[f64; N]| a.map(f64::to_bits) == b.map(f64::to_bits);
         let same = |(of, found): &&(u32, Enclosure<N>)| {
-            *of == halvings && found.lower_rad == *lower_rad && found.upper_rad == *upper_rad
+            *of == halvings && equal(&found.lower_rad, lower_rad) && equal(&found.upper_rad, upper_rad)
         };
         if let Some((_, found)) = known().iter().find(same) {
             return Ok(found.clone());

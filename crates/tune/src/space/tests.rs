@@ -95,13 +95,13 @@ fn the_shipped_space_has_five_degrees_of_freedom_and_holds_the_published_gains()
 }
 
 #[test]
-fn the_shipped_spaces_are_after_the_same() {
+fn the_shipped_spaces_say_what_they_are_after() {
     let [aic, mrac] =
         [SHIPPED, MRAC].map(|text| SpaceFile::parse(Path::new("space.toml"), text).unwrap().goals().clone());
-    assert_eq!(aic, mrac, "controllers are compared fairly");
     let limits: Vec<(Goal, Bound)> = aic.limits.iter().map(|limit| (limit.goal, limit.bound)).collect();
     assert_eq!(aic.objective, Goal::SettlingTime);
     assert_eq!(limits, [(Goal::Overshoot, Bound::At(0.02)), (Goal::Jitter, Bound::Of(Reference::Start))]);
+    assert!(mrac.objective == Goal::SettlingCost && mrac.limits.is_empty());
 }
 
 #[test]
@@ -266,7 +266,7 @@ fn the_adaptive_start_takes_the_law_of_the_space_and_keeps_its_pattern() {
     assert_ne!(admitted, start);
     assert!(start.rows().iter().zip(admitted.rows()).all(|(a, b)| *a == b), "only the law is another");
     let knob = |name: &str| space.knobs().iter().find(|knob| knob.name == name).unwrap();
-    assert_eq!(knob("adaptation").value(&admitted), 1.0);
+    assert!((knob("adaptation").value(&admitted) - 1.0).abs() < 1e-15);
     // 40, 200, .. over the inertias, which no value of the knob makes: the mean of their logarithms.
     let alpha1 = [40.0, 200.0, 40.0, 200.0, 200.0, 200.0, 40.0];
     let mean = alpha1.iter().zip(INERTIA_KG_M2).take(4).map(|(a, m): (&f64, f64)| (a / m).ln()).sum::<f64>() / 4.0;

@@ -1,5 +1,5 @@
 //! Gains of an AIC that every joint shares, by row.
-#![allow(dead_code)] // each test takes what it needs
+#![allow(dead_code, reason = "each test takes what it needs")]
 
 use std::path::Path;
 
