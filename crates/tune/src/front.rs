@@ -237,6 +237,21 @@ impl Sweep<'_> {
     }
 }
 
+/// Whether goals make a front.
+///
+/// # Errors
+/// [`FrontError::Goals`] when they are not two or three different ones.
+pub fn check(goals: &[Goal]) -> Result<(), FrontError> {
+    let mut different = goals.to_vec();
+    different.sort_unstable();
+    different.dedup();
+    if (2..=3).contains(&goals.len()) && different.len() == goals.len() {
+        Ok(())
+    } else {
+        Err(FrontError::Goals { found: different.len() })
+    }
+}
+
 /// The front of two or three goals. `settings.evaluations` candidates are measured at most; the same settings and measure give the same front.
 ///
 /// # Errors
@@ -248,12 +263,7 @@ pub fn front(
     settings: &SearchSettings,
     measure: &dyn Measure,
 ) -> Result<Front, FrontError> {
-    let mut different = goals.to_vec();
-    different.sort_unstable();
-    different.dedup();
-    if !(2..=3).contains(&goals.len()) || different.len() != goals.len() {
-        return Err(FrontError::Goals { found: different.len() });
-    }
+    check(goals)?;
     let (known, measured) = (Mutex::default(), Vec::new());
     let mut sweep = Sweep { space, goals, measure, settings: *settings, known, measured, evaluations: 0 };
     let open = vec![None; goals.len()];

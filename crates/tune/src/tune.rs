@@ -119,13 +119,19 @@ pub fn tune<C, R: Display>(
     }
     bench.progress.stage(Stage::Search);
     // A fifth of the evaluations waits for what the worst plants will show.
-    let reserve = if question.worst_plants == 0 { 0 } else { question.search.evaluations / 5 };
+    let reserve = if round_share(&question) == 0 { 0 } else { question.search.evaluations / 5 };
     let settings = SearchSettings { evaluations: question.search.evaluations - reserve, ..question.search };
     let run = search(space, start, &settings, bench.objective, bench.progress)?;
     // A search that nobody answers has not even evaluated its start.
     let start = start.filter(|_| !run.evaluations.is_empty()).map(|_| 0);
     let campaign = Campaign { question, space, bench, start, run, worst_plants: Vec::new() };
     Ok(campaign.finish(bench.objective, certify))
+}
+
+/// The evaluations of a round with a worse plant; 0 where there are too few for any.
+fn round_share(question: &Question) -> usize {
+    let share = (question.search.evaluations / 5).checked_div(question.worst_plants as usize).unwrap_or(0);
+    if share < 2 { 0 } else { share }
 }
 
 /// A run between its first search and its end.
@@ -174,9 +180,9 @@ impl Campaign<'_> {
 
     /// A harder objective, with the best candidates so far and those around them evaluated on it.
     fn harden<'o>(&mut self, objective: &'o dyn Objective) -> Option<Box<dyn Objective + 'o>> {
-        let SearchSettings { evaluations, .. } = self.question.search;
-        let share = evaluations / 5 / (self.question.worst_plants as usize).max(1);
-        if self.round() >= self.question.worst_plants || share < 2 || self.run.termination == Termination::Interrupted {
+        let share = round_share(&self.question);
+        if self.round() >= self.question.worst_plants || share == 0 || self.run.termination == Termination::Interrupted
+        {
             return None;
         }
         let ranked = self.ranked();

@@ -12,12 +12,13 @@
 
 use std::io::{BufRead, Write};
 
-use certune::closed_loop::Scenario;
+use certune::closed_loop::{AicTable, MracTable, Scenario};
 use certune::dynamics::Robot;
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::{Gains, Judge, Outcome, SimulatedObjective};
 use certune::{ArmCertifier, ArmGains, Over, family_of};
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use super::tune::{DEFAULT_PLANTS, DEFAULT_SEED, inertia_kg_m2, misfit, started};
 use crate::catalogue;
@@ -30,7 +31,7 @@ use crate::sizes::for_joint_count;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Heard {
-    gains: Gains,
+    gains: Value,
 }
 
 #[derive(Debug, Serialize)]
@@ -100,8 +101,13 @@ fn answer<R: BufRead, W: Write, const N: usize>(
 
 /// What becomes of the gains on a line, or why the line cannot be used.
 fn found<const N: usize>(text: &[u8], objective: &SimulatedObjective<'_, N>) -> Result<Found, String> {
-    let Heard { gains } = serde_json::from_slice(text)
-        .map_err(|error| format!("expected {{\"gains\":{{\"kappa_mu\":11.67, ..}}}}: {error}"))?;
+    let expected = |error: serde_json::Error| format!("expected {{\"gains\":{{\"kappa_mu\":11.67, ..}}}}: {error}");
+    let Heard { gains } = serde_json::from_slice(text).map_err(expected)?;
+    // Only the adaptive controller has laws: a table is read as one of its controller, so that what is wrong with it can be said.
+    let gains: Gains = match gains.get("law") {
+        None => serde_json::from_value::<AicTable>(gains).map_err(expected)?.into(),
+        Some(_) => serde_json::from_value::<MracTable>(gains).map_err(expected)?.into(),
+    };
     ArmGains::<N>::bind(&gains).map_err(|error| format!("gains: {error}"))?;
     let verdict = objective.judge(&gains);
     let figures = (!verdict.plants.is_empty()).then(|| spread(&verdict));
@@ -111,7 +117,7 @@ fn found<const N: usize>(text: &[u8], objective: &SimulatedObjective<'_, N>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use certune::closed_loop::{AicTable, PerJoint};
+    use certune::closed_loop::PerJoint;
     use certune::tune::Objective;
     use proptest::prelude::*;
 

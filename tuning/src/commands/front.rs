@@ -11,7 +11,7 @@ use certune::closed_loop::{Gains, GainsFile, Scenario};
 use certune::dynamics::Robot;
 use certune::report::{CommandLine, FrontGoal, FrontPoint, FrontReport, front_report};
 use certune::tune::filter::DEFAULT_SAMPLES;
-use certune::tune::front::{Front, Measure, Measured, front, non_dominated, spread_out};
+use certune::tune::front::{Front, Measure, Measured, check, front, non_dominated, spread_out};
 use certune::tune::{Goal, Goals, SearchSettings, SimulatedObjective, Source, Space};
 use certune::verify::{Certificate, Record};
 use certune::{ArmCertifier, Over, family_of};
@@ -127,6 +127,7 @@ fn record_of(folder: &Path) -> PathBuf {
 }
 
 fn plan(args: &FrontArgs) -> Result<Plan, Error> {
+    check(&args.goals)?;
     let robot = catalogue::robot(&args.robot.robot, args.robot.tip.as_deref())?;
     let scenario = catalogue::scenario(args.scenario.as_deref(), &robot)?;
     let source = catalogue::space(args.space.as_deref(), args.controller)?;
