@@ -86,11 +86,7 @@ impl<const N: usize> Batch<N> {
         if !goals.look_at_start() {
             return goals;
         }
-        let found = match Checked::new(start, self.task.step_s) {
-            None => Vec::new(),
-            Some(Checked::Aic(params)) => self.metrics(&params),
-            Some(Checked::Mrac(params)) => self.metrics(&*params),
-        };
+        let found = self.metrics_of(start, &self.plants);
         let worst = |goal: Goal| found.iter().map(|run| self.scoring.figure(goal, run)).fold(0.0, f64::max);
         goals.with_start(worst)
     }
@@ -182,14 +178,18 @@ impl<const N: usize> Batch<N> {
         self.metrics_on(params, &self.plants)
     }
 
-    /// The outcome of one run on each of `plants`; of none for gains that make no controller.
-    pub(crate) fn outcomes(&self, gains: &Gains, plants: &[(u64, Plant<N>)]) -> Vec<Outcome> {
-        let found = match Checked::new(gains, self.task.step_s) {
+    /// The same for gains of either controller; none for gains that make no controller.
+    fn metrics_of(&self, gains: &Gains, plants: &[(u64, Plant<N>)]) -> Vec<Metrics> {
+        match Checked::new(gains, self.task.step_s) {
             None => Vec::new(),
             Some(Checked::Aic(params)) => self.metrics_on(&params, plants),
             Some(Checked::Mrac(params)) => self.metrics_on(&*params, plants),
-        };
-        found.iter().map(|run| self.scoring.of_run(run)).collect()
+        }
+    }
+
+    /// The outcome of one run on each of `plants`; of none for gains that make no controller.
+    pub(crate) fn outcomes(&self, gains: &Gains, plants: &[(u64, Plant<N>)]) -> Vec<Outcome> {
+        self.metrics_of(gains, plants).iter().map(|run| self.scoring.of_run(run)).collect()
     }
 
     /// One run on each plant. Costs one simulation of the scenario per plant.
@@ -345,15 +345,19 @@ impl<const N: usize> SimulatedObjective<'_, N> {
         &self.filter
     }
 
-    /// The figures of the goals that no run answers, or what becomes of gains without them.
+    /// The figures of those of `goals` that no run answers, or what becomes of gains that are unstable or without a proof.
     fn unsimulated<P: Parameters<N>>(
         &self,
         gains: &Gains,
         params: &P,
-        growth_per_s: Finite,
+        goals: &[Goal],
     ) -> Result<Vec<(Goal, f64)>, Outcome> {
-        let goals = self.batch.scoring.goals();
-        let proved = goals.from(Source::Proved);
+        let growth_per_s = self.filter.growth_per_s(params);
+        if growth_per_s.get() >= 0.0 {
+            return Err(Outcome::Unstable { abscissa_per_s: growth_per_s });
+        }
+        let of = |source: Source| goals.iter().copied().filter(|goal| goal.source() == source).collect::<Vec<_>>();
+        let proved = of(Source::Proved);
         let mut figures = Vec::new();
         if !proved.is_empty() {
             // Where nothing is proved the slowest mode of the sample is what can be compared.
@@ -361,7 +365,7 @@ impl<const N: usize> SimulatedObjective<'_, N> {
             let found = self.prover.figures(gains, &proved).ok_or_else(refused)?;
             figures.extend(proved.into_iter().zip(found));
         }
-        for goal in goals.from(Source::Linearised) {
+        for goal in of(Source::Linearised) {
             figures.push((goal, self.filter.delay_margin_s(params, self.batch.task.step_s)));
         }
         Ok(figures)
@@ -375,15 +379,11 @@ impl<const N: usize> SimulatedObjective<'_, N> {
         enough: Option<Finite>,
         simulate: impl FnOnce(Option<Finite>) -> Outcome,
     ) -> Outcome {
-        let growth_per_s = self.filter.growth_per_s(params);
-        if growth_per_s.get() >= 0.0 {
-            return Outcome::Unstable { abscissa_per_s: growth_per_s };
-        }
-        let figures = match self.unsimulated(gains, params, growth_per_s) {
-            Ok(figures) => figures,
-            Err(refused) => return refused,
-        };
         let goals = self.batch.scoring.goals();
+        let figures = match self.unsimulated(gains, params, &goals.all()) {
+            Ok(figures) => figures,
+            Err(failed) => return failed,
+        };
         let figure = |goal: Goal| figures.iter().find(|(other, _)| *other == goal).map(|(_, figure)| *figure);
         let mut excess = Excess::default();
         for (goal, bound) in goals.limits_from(Source::Proved).chain(goals.limits_from(Source::Linearised)) {
@@ -445,17 +445,7 @@ impl<const N: usize> Objective for SimulatedObjective<'_, N> {
 
 impl<const N: usize> SimulatedObjective<'_, N> {
     fn measured<P: Parameters<N>>(&self, gains: &Gains, params: &P, goals: &[Goal]) -> Result<Vec<f64>, Outcome> {
-        let growth_per_s = self.filter.growth_per_s(params);
-        if growth_per_s.get() >= 0.0 {
-            return Err(Outcome::Unstable { abscissa_per_s: growth_per_s });
-        }
-        let of = |source: Source| goals.iter().copied().filter(|goal| goal.source() == source).collect::<Vec<_>>();
-        let proved = of(Source::Proved);
-        let refused = || Outcome::Uncertified { cost: Finite::saturating(-growth_per_s.get().recip()) };
-        let figures = match proved.is_empty() {
-            true => Vec::new(),
-            false => self.prover.figures(gains, &proved).ok_or_else(refused)?,
-        };
+        let figures = self.unsimulated(gains, params, goals)?;
         let runs = self.batch.metrics(params);
         let scoring = &self.batch.scoring;
         // Limits first, and divergence: whoever fails has no figures.
@@ -463,10 +453,9 @@ impl<const N: usize> SimulatedObjective<'_, N> {
         if !matches!(outcome, Outcome::Simulated { .. }) {
             return Err(outcome);
         }
-        let figure = |goal: &Goal| match goal.source() {
-            Source::Proved => proved.iter().position(|other| other == goal).map_or(0.0, |place| figures[place]),
-            Source::Linearised => self.filter.delay_margin_s(params, self.batch.task.step_s),
-            Source::Simulated => scoring.tail(runs.iter().map(|run| scoring.figure(*goal, run))),
+        let figure = |goal: &Goal| match figures.iter().find(|(other, _)| other == goal) {
+            Some((_, figure)) => *figure,
+            None => scoring.tail(runs.iter().map(|run| scoring.figure(*goal, run))),
         };
         Ok(goals.iter().map(figure).collect())
     }

@@ -315,12 +315,15 @@ impl Goals {
         self.limits.iter().filter_map(bound).filter(move |(goal, _)| goal.source() == source)
     }
 
-    /// The goals, objective included, whose figures are found in that way.
-    pub fn from(&self, source: Source) -> Vec<Goal> {
+    /// The objective and the goals of the limits.
+    pub fn all(&self) -> Vec<Goal> {
         let limits = self.limits.iter().map(|limit| limit.goal);
-        let mut goals: Vec<Goal> = core::iter::once(self.objective).chain(limits).collect();
-        goals.retain(|goal| goal.source() == source);
-        goals
+        core::iter::once(self.objective).chain(limits).collect()
+    }
+
+    /// Those whose figures are found in that way.
+    pub fn from(&self, source: Source) -> Vec<Goal> {
+        self.all().into_iter().filter(|goal| goal.source() == source).collect()
     }
 
     /// The same goals with bounds that are all numbers: what the start reaches, `figure`, where a limit says so.
