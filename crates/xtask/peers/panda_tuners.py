@@ -2,8 +2,8 @@
 
     AUTOTUNE=PROGRAM panda_tuners.py
 
-Every method searches the five gains of tuning/spaces/panda-aic.toml and gets its costs, in s, from
-`autotune evaluate --robot panda`, the same plants for all.
+Every method searches the five gains of tuning/spaces/panda-aic.toml and gets its costs, settling times in s, from
+`autotune evaluate --robot panda`, the same plants and limits for all.
 """
 
 import functools
@@ -16,12 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
-from tuner_methods import FAILED, OURS
+from tuner_methods import OURS
 from tuner_table import Row, Setting, compare
 
 TUNING = Path(__file__).parents[3] / "tuning"
 SPACE = (TUNING / "spaces/panda-aic.toml").read_text(encoding="utf-8")
 PRESET = (TUNING / "presets/pezzato2020-simulation.toml").read_text(encoding="utf-8")
+# A move lasts some seconds, and so does the longest settling time.
+ABOVE_COSTS = 100.0
 START = 'start = "pezzato2020-simulation"'
 
 SETTINGS = [Setting(300, True, (None, None)), Setting(1000, True, (None, None))]
@@ -35,14 +37,15 @@ def evaluator():
     return subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, bufsize=1)
 
 
-def cost(answer):
-    """The cost in a line of `autotune evaluate`; what was unstable or ran away has none."""
+def told(answer):
+    """What every method is told of a line of `autotune evaluate`: the cost, or for gains that have none, because they
+    break a limit, are unstable or ran away, a number above every cost, in the order of their scores."""
     if not answer:
         raise RuntimeError("autotune evaluate ended without an answer; its own message stands above")
     found = json.loads(answer)
     if "error" in found:
         raise RuntimeError(f"autotune evaluate: {found['error']}")
-    return found["cost"] if found["cost"] is not None else FAILED
+    return found["cost"] if found["cost"] is not None else ABOVE_COSTS + found["score"]
 
 
 class PandaGains:
@@ -66,7 +69,7 @@ class PandaGains:
     def score(self, gains):
         program = evaluator()
         program.stdin.write(json.dumps({"gains": gains}) + "\n")
-        return cost(program.stdout.readline())
+        return told(program.stdout.readline())
 
     def space(self, cold):
         if START not in SPACE:
