@@ -179,7 +179,7 @@ pub fn asked_mrac(
 pub fn stored_with_records(name: &str, derived: &Answer) -> Result<Certificate, ProofError> {
     if std::env::var_os("CERTUNE_WRITE_CLAIMS").is_some() {
         let known = records()?;
-        for record in derived.records.iter().filter(|record| known.iter().all(|known| known.sha256 != record.sha256)) {
+        for record in derived.record.iter().filter(|record| known.iter().all(|known| known.sha256 != record.sha256)) {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(RECORDS[1]).join(format!("{name}.json"));
             let failed = |source| ProofError::Stored { path: path.clone(), source };
             if let Some(folder) = path.parent() {

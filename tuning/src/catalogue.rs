@@ -222,9 +222,13 @@ fn generic_box() -> PlantBox {
 
 /// The built-in records of proved constants, and those of the files.
 pub fn records(files: &[PathBuf]) -> Result<Vec<Record>, Error> {
-    let built_in = CONSTANTS.iter().map(|(name, text)| record(Path::new(name), text));
-    let given = files.iter().map(|path| record(path, &output::read_file(path)?));
-    built_in.chain(given).collect()
+    let built_in = CONSTANTS.iter().map(|(name, text)| parsed(Path::new(name), text));
+    built_in.chain(files.iter().map(|path| record(path))).collect()
+}
+
+/// The record of proved constants in a file.
+pub fn record(path: &Path) -> Result<Record, Error> {
+    parsed(path, &output::read_file(path)?)
 }
 
 /// The built-in robot that a record is about.
@@ -236,7 +240,7 @@ pub fn robot_of(record: &Record) -> Result<Robot, Error> {
         .ok_or_else(|| Error::RobotOfRecord { robot: record.arm.name.clone(), sha256: record.arm.sha256.clone() })
 }
 
-fn record(path: &Path, text: &str) -> Result<Record, Error> {
+fn parsed(path: &Path, text: &str) -> Result<Record, Error> {
     Record::parse(text)
         .map_err(|source| Error::Record { path: path.to_path_buf(), source })?
         .map_err(|source| Error::RecordRejected { path: path.to_path_buf(), source })

@@ -22,6 +22,7 @@
 #![forbid(unsafe_code)]
 
 mod catalogue;
+mod certificate;
 mod cli;
 mod commands;
 mod error;

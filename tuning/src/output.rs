@@ -154,9 +154,24 @@ impl Staged {
     }
 }
 
+/// Writes files beside their places, all of them or none; [`commit`] puts them there.
+pub fn stage(files: &[(PathBuf, String)]) -> Result<Vec<Staged>, Error> {
+    files.iter().map(|(path, content)| Staged::write(path, content)).collect()
+}
+
+/// Puts files in their places.
+pub fn commit(staged: Vec<Staged>) -> Result<(), Error> {
+    staged.into_iter().try_for_each(Staged::commit)
+}
+
+/// Whether something is there that must be written into and not replaced: a device or a pipe.
+pub fn is_device(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir())
+}
+
 /// Makes sure that a file can be written, before the work whose result it is to hold; the file itself stays as it is.
 pub fn check_writable(path: &Path) -> Result<(), Error> {
-    if std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+    if is_device(path) {
         return Ok(());
     }
     Staged::write(path, "").map(drop)
@@ -164,7 +179,7 @@ pub fn check_writable(path: &Path) -> Result<(), Error> {
 
 /// Writes one file whole or not at all; into a device or a pipe (`/dev/stdout`) the content is simply written.
 pub fn write_file(path: &Path, content: &str) -> Result<(), Error> {
-    if std::fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
+    if is_device(path) {
         let write = || std::fs::OpenOptions::new().write(true).open(path)?.write_all(content.as_bytes());
         return write().map_err(cannot("write", path));
     }

@@ -11,8 +11,8 @@
 
 use certune::closed_loop::{Gains, Scenario};
 use certune::tune::{Finite, Hardened, Objective, Outcome};
-use certune::verify::{Certificate, ClaimKind};
-use certune::{ArmCertifier, ArmGains, Request, StabilityError};
+use certune::verify::ClaimKind;
+use certune::{Answer, ArmCertifier, ArmGains, Request, StabilityError};
 
 /// The goals of a scenario, each once, in their order.
 pub fn goals(scenario: &Scenario) -> Vec<&[f64]> {
@@ -33,12 +33,12 @@ pub fn certificates(gains: &Gains, scenario: &Scenario) -> usize {
     }
 }
 
-/// The certificates of `gains`, up to the first that does not hold. The gains keep the promise if all hold.
+/// The certificates of `gains`, up to the first that does not hold. The gains keep the promise if all hold ([`holds`]).
 pub fn certify<const N: usize>(
     certifier: &ArmCertifier<N>,
     scenario: &Scenario,
     gains: &Gains,
-) -> Result<Vec<Certificate>, StabilityError> {
+) -> Result<Vec<Answer>, StabilityError> {
     let bound = ArmGains::<N>::bind(gains)?;
     let asked: Vec<Request> = match gains {
         Gains::Aic(_) if bound.are_shared() => {
@@ -56,14 +56,19 @@ pub fn certify<const N: usize>(
     };
     let mut made = Vec::new();
     for request in &asked {
-        let certificate = certifier.answer(&bound, request)?.certificate;
-        let holds = certificate.all_hold();
-        made.push(certificate);
+        let answer = certifier.answer(&bound, request)?;
+        let holds = answer.certificate.all_hold();
+        made.push(answer);
         if !holds {
             break;
         }
     }
     Ok(made)
+}
+
+/// Whether every claim of every certificate holds.
+pub fn holds(certificates: &[Answer]) -> bool {
+    certificates.iter().all(|answer| answer.certificate.all_hold())
 }
 
 /// An objective behind the promise: a candidate that does not keep it is worse than any that does, whatever it costs.
@@ -78,7 +83,7 @@ impl<const N: usize> Objective for Promised<'_, N> {
         let outcome = self.objective.evaluate(gains, enough);
         let Outcome::Simulated { cost } = outcome else { return outcome };
         match certify(self.certifier, self.scenario, gains) {
-            Ok(made) if made.iter().all(Certificate::all_hold) => outcome,
+            Ok(made) if holds(&made) => outcome,
             Ok(_) | Err(_) => Outcome::Uncertified { cost },
         }
     }

@@ -1,19 +1,21 @@
 //! A run's folder: `gains.toml`, `run.json`, `certificate.json`, `report.html`. Where the claims are about one goal each, there is a certificate for
-//! every goal: `certificate-1.json`, `certificate-2.json`, ..
+//! every goal: `certificate-1.json`, `certificate-2.json`, .., and the constants that it rests on beside it: `certificate-1.constants.json`, ..
 //!
 //! `run.json` and `gains.toml` are the same to the byte for the same question and versions: they hold no time, no path and nothing of
 //! the machine. All files are written beside their places first and moved there together.
 
 use std::path::{Path, PathBuf};
 
+use certune::Answer;
 use certune::closed_loop::{GainsFile, Scenario};
 use certune::tune::RunRecord;
-use certune::verify::{Certificate, verify};
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::catalogue;
+use crate::certificate;
 use crate::error::Error;
-use crate::output::{self, Staged};
+use crate::output;
 use crate::promise;
 use crate::versions::VERSION;
 
@@ -38,7 +40,7 @@ pub struct RunFile {
 pub struct Run {
     pub file: RunFile,
     /// For a run without winner, those of its best candidate up to the refusal.
-    pub certificates: Vec<Certificate>,
+    pub certificates: Vec<Answer>,
 }
 
 /// The names.
@@ -74,21 +76,14 @@ impl Folder {
         let path = self.record();
         let text = std::fs::read_to_string(&path).map_err(|source| Error::NoRun { path: path.clone(), source })?;
         let file = RunFile::parse(&path, &text)?;
+        let records = catalogue::records(&[])?;
         let mut certificates = Vec::new();
         for path in self.certificates(file.certificates()) {
-            match output::read_file(&path) {
-                // Those of a refused candidate end with the refusal.
-                Err(Error::Io { source, .. })
-                    if source.kind() == std::io::ErrorKind::NotFound && file.record.winner.is_none() =>
-                {
-                    break;
-                }
-                text => certificates.push(
-                    verify(&text?, &crate::catalogue::records(&[])?)
-                        .map_err(|source| Error::Certificate { path: path.clone(), source })?
-                        .map_err(|source| Error::Rejected { path, source })?,
-                ),
+            // Those of a refused candidate end with the refusal.
+            if file.record.winner.is_none() && !path.exists() {
+                break;
             }
+            certificates.push(certificate::read(&path, &records)?.map_err(|source| Error::Rejected { path, source })?);
         }
         Ok(Run { file, certificates })
     }
@@ -101,6 +96,7 @@ impl Folder {
             let name = entry.map_err(broken)?.file_name();
             let number = name.to_str().and_then(|name| name.strip_prefix("certificate")?.strip_suffix(".json"));
             let is_ours = |number: &str| {
+                let number = number.strip_suffix(".constants").unwrap_or(number);
                 number.is_empty() || number.strip_prefix('-').is_some_and(|digits| digits.parse::<usize>().is_ok())
             };
             if number.is_some_and(is_ours) {
@@ -113,25 +109,22 @@ impl Folder {
     /// Writes all files of a run; those that this run has not, of an earlier run in the same folder, are removed.
     pub fn write(&self, run: &Run, page: &str) -> Result<Vec<PathBuf>, Error> {
         let record = serde_json::to_string_pretty(&run.file)? + "\n";
-        let gains = run.file.gains_toml();
-        let texts: Vec<String> = run.certificates.iter().map(certune::certificate_text).collect::<Result<_, _>>()?;
-        let mut files = vec![(self.gains(), gains), (self.record(), Some(record))];
-        files.extend(self.certificates(run.file.certificates()).into_iter().zip(texts.into_iter().map(Some)));
-        files.push((self.report(), Some(page.to_owned())));
-        let mut staged = Vec::new();
-        for (path, content) in &files {
-            if let Some(content) = content {
-                staged.push(Staged::write(path, content)?);
-            }
+        let mut files: Vec<(PathBuf, String)> =
+            run.file.gains_toml().map(|gains| (self.gains(), gains)).into_iter().collect();
+        files.push((self.record(), record));
+        for (path, answer) in self.certificates(run.file.certificates()).iter().zip(&run.certificates) {
+            files.extend(certificate::files(path, answer)?);
         }
-        let is_new = |path: &PathBuf| files.iter().any(|(new, content)| new == path && content.is_some());
+        files.push((self.report(), page.to_owned()));
+        let staged = output::stage(&files)?;
+        let is_new = |path: &PathBuf| files.iter().any(|(new, _)| new == path);
         for path in self.earlier_certificates()?.into_iter().chain([self.gains()]) {
             if !is_new(&path) {
                 output::remove_file(&path)?;
             }
         }
-        staged.into_iter().try_for_each(Staged::commit)?;
-        Ok(files.into_iter().filter(|(_, content)| content.is_some()).map(|(path, _)| path).collect())
+        output::commit(staged)?;
+        Ok(files.into_iter().map(|(path, _)| path).collect())
     }
 }
 

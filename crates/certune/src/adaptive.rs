@@ -55,7 +55,7 @@ impl<const N: usize> ArmCertifier<N> {
         let problem = self.adaptive_problem(gains, setting)?;
         let made = claims.iter().map(|kind| self.adaptive_claim(&problem, setting, *kind)).collect();
         let certificate = checked(problem.document().clone(), made, problem.records())?;
-        Ok(Answer { certificate, records: problem.records().to_vec() })
+        Ok(Answer::new(certificate, problem.records()))
     }
 
     fn adaptive_claim(&self, problem: &Problem, setting: &AdaptiveSetting<N>, kind: ClaimKind) -> Claim {

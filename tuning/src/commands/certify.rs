@@ -3,13 +3,14 @@
 use certune::certify::GoalListValues;
 use certune::closed_loop::{Gains, LawName, PlantBox, Scenario};
 use certune::dynamics::{Link, Robot};
-use certune::verify::{Certificate, ConfigurationSet, Evidence, Record};
-use certune::{Answer, ArmCertifier, ArmGains, Growth, Over, Request, certificate_text, family_of};
+use certune::verify::{ConfigurationSet, Evidence, Record};
+use certune::{Answer, ArmCertifier, ArmGains, Growth, Over, Request, family_of};
 use serde::Serialize;
 
 use super::claims::{AssumptionSummary, ClaimSummary, claims_in_words, growths, summaries};
 use super::verify::exit_of;
 use crate::catalogue::{self, GainsSource};
+use crate::certificate;
 use crate::cli::{ArmsArgs, CertifyArgs, Context, Exit, OverName, Switch};
 use crate::error::Error;
 use crate::output;
@@ -51,26 +52,21 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
         None => (plant_box(args, &robot), None),
     };
     let over = over(args.over, args.scenario.as_deref(), &robot)?;
-    let Certified { certificate, growth, unknown_records } = for_joint_count!(robot.joints(), N => {
-        certificate::<N>(args, &robot, &gains, &plant_box, (&records, &over), context)
+    let (answer, growth) = for_joint_count!(robot.joints(), N => {
+        answer::<N>(args, &robot, &gains, &plant_box, (&records, &over), context)
     })
     .unwrap_or_else(|| Err(catalogue::too_many_joints(&robot)))?;
-    let mut companions = Vec::new();
     if let Some(path) = &args.out {
-        output::write_file(path, &certificate_text(&certificate)?)?;
-        for record in &unknown_records {
-            let beside = path.with_extension("constants.json");
-            output::write_file(&beside, &(serde_json::to_string_pretty(record)? + "\n"))?;
-            companions.push(beside);
-        }
+        certificate::write(path, &answer)?;
     }
+    let certificate = &answer.certificate;
     if context.json {
         output::print_json(&Summary {
             robot: robot.name().to_owned(),
             gains: args.gains.clone(),
             family: plant_box,
             about: certificate.document().about.clone(),
-            claims: summaries(&certificate, &growth),
+            claims: summaries(certificate, &growth),
             assumptions: certificate.assumptions().into_iter().map(Into::into).collect(),
             constants_sha256: match &certificate.document().constants.evidence {
                 Evidence::Proved { record_sha256 } => Some(record_sha256.clone()),
@@ -80,7 +76,7 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
             file: args.out.as_ref().map(|path| path.display().to_string()),
         })?;
     } else {
-        let mut text = claims_in_words(&certificate, &growth, context.verbose);
+        let mut text = claims_in_words(certificate, &growth, context.verbose);
         let narrower = args.over.is_some_and(|over| over != OverName::Torus);
         if narrower && certificate.document().constants.over == ConfigurationSet::AllAngles {
             let note = "Note: no record of proved constants is at hand for those configurations alone; the claims are about all angles.";
@@ -93,13 +89,11 @@ pub fn run(args: &CertifyArgs, context: Context) -> Result<Exit, Error> {
             text.push_str(&output::wrapped(&note, 0));
         }
         if let Some(path) = &args.out {
-            let constants =
-                companions.iter().map(|path| format!(" --constants {}", path.display())).collect::<String>();
-            text.push_str(&format!("written to {}; check it with `autotune verify {0}{constants}`\n", path.display()));
+            text.push_str(&format!("written to {}; check it with `autotune verify {0}`\n", path.display()));
         }
         output::print(&text)?;
     }
-    Ok(exit_of(&certificate))
+    Ok(exit_of(certificate))
 }
 
 /// Least and largest value of the robot's own links.
@@ -134,14 +128,6 @@ fn plant_box(args: &CertifyArgs, robot: &Robot) -> PlantBox {
         delay_samples: [0; 2],
         gravity_compensation: args.gravity_compensation == Some(Switch::On),
     }
-}
-
-/// What a certificate took, and what goes with it.
-struct Certified {
-    certificate: Certificate,
-    growth: Vec<Option<Growth>>,
-    /// Records made for this certificate: they must be kept with it.
-    unknown_records: Vec<Record>,
 }
 
 /// What else could be asked about gains whose law no claim covers.
@@ -198,14 +184,15 @@ fn around(scenario: &Scenario, robot: &Robot) -> Over {
     Over::Box { lower_rad, upper_rad }
 }
 
-fn certificate<const N: usize>(
+/// The answer, and the growth that each of its claims speaks of.
+fn answer<const N: usize>(
     args: &CertifyArgs,
     robot: &Robot,
     source: &GainsSource,
     plant_box: &PlantBox,
     (records, over): (&[Record], &Over),
     context: Context,
-) -> Result<Certified, Error> {
+) -> Result<(Answer, Vec<Option<Growth>>), Error> {
     let gains: ArmGains<N> = match &source.gains.gains {
         Gains::Aic(table) => source.aic_gains::<N>(table, STEP_S)?.into(),
         Gains::Mrac(table) => (*source.mrac_params::<N>(table, STEP_S)?.gains()).into(),
@@ -244,16 +231,10 @@ fn certificate<const N: usize>(
         }
     }
     progress.begin("searching for proofs");
-    let answer =
-        certifier.answer(&gains, &request).map_err(Error::from).and_then(|Answer { certificate, records: used }| {
-            let growth = growths::<N>(robot, &certificate)?;
-            let known = |record: &Record| records.iter().any(|known| known.sha256 == record.sha256);
-            Ok(Certified {
-                certificate,
-                growth,
-                unknown_records: used.into_iter().filter(|record| !known(record)).collect(),
-            })
-        });
+    let answer = certifier.answer(&gains, &request).map_err(Error::from).and_then(|answer| {
+        let growth = growths::<N>(robot, &answer.certificate)?;
+        Ok((answer, growth))
+    });
     progress.finish();
     answer
 }

@@ -13,16 +13,17 @@ use certune::report::{CommandLine, FrontGoal, FrontPoint, FrontReport, front_rep
 use certune::tune::filter::DEFAULT_SAMPLES;
 use certune::tune::front::{Front, Measure, Measured, check, front, non_dominated, spread_out};
 use certune::tune::{Goal, Goals, SearchSettings, SimulatedObjective, Source, Space};
-use certune::verify::{Certificate, Record};
+use certune::verify::Record;
 use certune::{ArmCertifier, Over, family_of};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::tune::{DEFAULT_PLANTS, DEFAULT_SEED, inertia_kg_m2, misfit, run_name, started};
 use crate::catalogue::{self, SpaceSource};
+use crate::certificate;
 use crate::cli::{Context, Exit, FrontArgs, PickArgs};
 use crate::error::Error;
-use crate::output::{self, Staged, number, table};
+use crate::output::{self, number, table};
 use crate::progress::Terminal;
 use crate::promise;
 use crate::run::Folder;
@@ -106,8 +107,7 @@ pub fn run(args: &FrontArgs, context: Context) -> Result<Exit, Error> {
     let page = front_report(&report(&plan, &args.robot.robot))?;
     let json = serde_json::to_string_pretty(&plan.file)? + "\n";
     let files = [(record_of(&plan.folder), json), (plan.folder.join("front.html"), page)];
-    let staged = files.iter().map(|(path, content)| Staged::write(path, content)).collect::<Result<Vec<_>, _>>()?;
-    staged.into_iter().try_for_each(Staged::commit)?;
+    output::commit(output::stage(&files)?)?;
     if context.json {
         output::print_json(&Summary {
             directory: plan.folder.display().to_string(),
@@ -194,7 +194,7 @@ fn sweep<const N: usize>(plan: &Plan, progress: &Terminal) -> Result<FrontFile, 
             .into_par_iter()
             .map(|gains| {
                 let made = promise::certify(&certifier, scenario, gains);
-                (gains.clone(), made.is_ok_and(|made| made.iter().all(Certificate::all_hold)))
+                (gains.clone(), made.is_ok_and(|made| promise::holds(&made)))
             })
             .collect();
         let bad: Vec<Gains> = verdicts.iter().filter(|(_, holds)| !holds).map(|(gains, _)| gains.clone()).collect();
@@ -351,7 +351,7 @@ pub fn pick(args: &PickArgs, context: Context) -> Result<Exit, Error> {
             .and_then(|certifier| Ok(promise::certify(&certifier, &file.scenario, &point.gains)?))
     })
     .unwrap_or_else(|| Err(catalogue::too_many_joints(&robot)))?;
-    if !certificates.iter().all(Certificate::all_hold) {
+    if !promise::holds(&certificates) {
         return Err(Error::PointRefused { point: args.point });
     }
     let source = format!(
@@ -361,22 +361,27 @@ pub fn pick(args: &PickArgs, context: Context) -> Result<Exit, Error> {
     let gains = GainsFile { source: Some(source), gains: point.gains.clone() }.to_toml();
     output::prepare_folder(&folder.path)?;
     let mut files = vec![(folder.gains(), gains)];
-    let count = certificates.len();
-    for (path, certificate) in folder.certificates(count).into_iter().zip(&certificates) {
-        files.push((path, certune::certificate_text(certificate)?));
+    let paths = folder.certificates(certificates.len());
+    for (path, answer) in paths.iter().zip(&certificates) {
+        files.extend(certificate::files(path, answer)?);
     }
-    let staged = files.iter().map(|(path, content)| Staged::write(path, content)).collect::<Result<Vec<_>, _>>()?;
-    staged.into_iter().try_for_each(Staged::commit)?;
-    let names: Vec<String> = files.iter().map(|(path, _)| path.display().to_string()).collect();
+    output::commit(output::stage(&files)?)?;
+    let names =
+        |paths: &mut dyn Iterator<Item = &PathBuf>| paths.map(|path| path.display().to_string()).collect::<Vec<_>>();
+    let written = names(&mut files.iter().map(|(path, _)| path));
     if context.json {
         output::print_json(&Picked {
-            files: &names,
+            files: &written,
             gains: &point.gains,
             figures: &point.figures,
             goals: &file.goals,
         })?;
     } else {
-        output::print(&format!("{}\ncheck it: autotune verify {}\n", names.join("\n"), names[1..].join(" ")))?;
+        output::print(&format!(
+            "{}\ncheck it: autotune verify {}\n",
+            written.join("\n"),
+            names(&mut paths.iter()).join(" ")
+        ))?;
     }
     Ok(Exit::Holds)
 }

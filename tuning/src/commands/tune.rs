@@ -15,7 +15,7 @@ use certune::tune::{
     tune,
 };
 use certune::verify::{Certificate, Claim, Record, Verdict};
-use certune::{ArmCertifier, Growth, Over, StabilityError, family_of};
+use certune::{Answer, ArmCertifier, Growth, Over, StabilityError, family_of};
 use serde::Serialize;
 
 use super::claims::{ClaimSummary, claims_in_words, growths, summaries};
@@ -116,8 +116,13 @@ pub fn carry_out(plan: &Plan, mut journal: Journal, threads: Option<usize>, cont
             files: files.iter().map(|path| path.display().to_string()).collect(),
             gains: run.file.record.tuned(),
             held_out: Compared { published: start.as_ref().map(spread), tuned: tuned.as_ref().map(spread) },
-            about: run.certificates.iter().map(|certificate| certificate.document().about.clone()).collect(),
-            claims: run.certificates.iter().zip(&growth).flat_map(|(one, growth)| summaries(one, growth)).collect(),
+            about: run.certificates.iter().map(|one| one.certificate.document().about.clone()).collect(),
+            claims: run
+                .certificates
+                .iter()
+                .zip(&growth)
+                .flat_map(|(one, growth)| summaries(&one.certificate, growth))
+                .collect(),
             elapsed_s: progress.elapsed_s(),
         })?;
     } else {
@@ -284,12 +289,12 @@ fn tune_arm<const N: usize>(
     };
     let journalled = Journalled::new(&*objective, journal, stop);
     let bench = Bench { objective: &journalled, judge: &judge, progress };
-    let mut first_refusal: Option<Vec<Certificate>> = None;
+    let mut first_refusal: Option<Vec<Answer>> = None;
     let mut failure: Option<StabilityError> = None;
     let certify = |gains: &Gains| match promise::certify(&certifier, scenario, gains) {
-        Ok(certificates) if certificates.iter().all(Certificate::all_hold) => Ok(certificates),
+        Ok(certificates) if promise::holds(&certificates) => Ok(certificates),
         Ok(refused) => {
-            let reason = refused.last().map(why_not).unwrap_or_default();
+            let reason = refused.last().map(|refusal| why_not(&refusal.certificate)).unwrap_or_default();
             progress.detail(|| format!("          {reason}"));
             first_refusal.get_or_insert(refused);
             Err(reason)
@@ -315,7 +320,7 @@ fn tune_arm<const N: usize>(
     let run = Run { file, certificates: certificate.or(first_refusal).unwrap_or_default() };
     progress.begin("writing the report");
     let page = page::page::<N>(&run, robot, &header.robot, &plan.folder)?;
-    let growth = run.certificates.iter().map(|certificate| growths::<N>(robot, certificate));
+    let growth = run.certificates.iter().map(|one| growths::<N>(robot, &one.certificate));
     let growth = growth.collect::<Result<_, _>>()?;
     Ok((run, page, growth))
 }
@@ -446,7 +451,8 @@ fn in_words(plan: &Plan, run: &Run, growth: &[Growths], files: &[PathBuf], elaps
         text.push_str(&output::wrapped(&kept, 0));
     }
     let _ = writeln!(text);
-    let claims = run.certificates.iter().zip(growth).map(|(one, growth)| claims_in_words(one, growth, false));
+    let claims =
+        run.certificates.iter().zip(growth).map(|(one, growth)| claims_in_words(&one.certificate, growth, false));
     let claims = claims.collect::<Vec<_>>().join("\n");
     match record.winner() {
         Some(_) => text.push_str(&claims),

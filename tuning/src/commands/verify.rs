@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
+use certune::Answer;
 use certune::bounds::recheck;
-use certune::verify::{Certificate, Evidence, Record, Rejection, verify};
+use certune::verify::{Certificate, Evidence, Record, Rejection};
 use serde::Serialize;
 
 use super::claims::{AssumptionSummary, ClaimSummary, claims_in_words, summaries};
 use crate::catalogue;
+use crate::certificate;
 use crate::cli::{Context, Exit, VerifyArgs};
 use crate::error::Error;
 use crate::output;
@@ -53,10 +55,12 @@ pub fn run(args: &VerifyArgs, context: Context) -> Result<Exit, Error> {
     let records = catalogue::records(&args.constants)?;
     let mut worst = Exit::Holds;
     let mut files = Vec::new();
+    let mut used: Vec<Record> = Vec::new();
     for path in &args.files {
-        let (exit, summary) = check(path, &records, context)?;
+        let (exit, summary, record) = check(path, &records, context)?;
         worst = worst.max(exit);
         files.push(summary);
+        used.extend(record.filter(|record| used.iter().all(|other| other.sha256 != record.sha256)));
     }
     if !args.full {
         if context.json {
@@ -64,12 +68,8 @@ pub fn run(args: &VerifyArgs, context: Context) -> Result<Exit, Error> {
         }
         return Ok(worst);
     }
-    let used = |record: &&Record| {
-        args.files.is_empty()
-            || files.iter().filter_map(|file| file.constants.as_ref()).any(|used| used.record_sha256 == record.sha256)
-    };
     let mut constants = Vec::new();
-    for record in records.iter().filter(used) {
+    for record in if args.files.is_empty() { &records } else { &used } {
         let (exit, summary) = derive_again(record, args, context)?;
         worst = worst.max(exit);
         constants.push(summary);
@@ -122,7 +122,8 @@ fn short(sha256: &str) -> &str {
     sha256.get(..12).unwrap_or(sha256)
 }
 
-fn check(path: &Path, records: &[Record], context: Context) -> Result<(Exit, FileSummary), Error> {
+/// The verdict on a file, and the record that it rests on.
+fn check(path: &Path, records: &[Record], context: Context) -> Result<(Exit, FileSummary, Option<Record>), Error> {
     let file = path.display().to_string();
     let failed = |verdict, reason: String| FileSummary {
         file: file.clone(),
@@ -134,19 +135,16 @@ fn check(path: &Path, records: &[Record], context: Context) -> Result<(Exit, Fil
         claims: Vec::new(),
         assumptions: Vec::new(),
     };
-    let read = output::read_file(path).and_then(|text| {
-        verify(&text, records).map_err(|source| Error::Certificate { path: path.to_path_buf(), source })
-    });
-    match read {
+    match certificate::read(path, records) {
         Err(error) => {
             output::say(&error.in_full());
-            Ok((Exit::Unreadable, failed("unreadable", error.to_string())))
+            Ok((Exit::Unreadable, failed("unreadable", error.to_string()), None))
         }
         Ok(Err(rejection)) => {
             output::say(&format!("rejected: {file}: {rejection}\n  try: {}", advice(&rejection)));
-            Ok((Exit::NotCertified, failed("rejected", rejection.to_string())))
+            Ok((Exit::NotCertified, failed("rejected", rejection.to_string()), None))
         }
-        Ok(Ok(certificate)) => {
+        Ok(Ok(Answer { certificate, record })) => {
             if !context.json {
                 output::print(&format!("{file}\n{}\n", claims_in_words(&certificate, &[], true)))?;
             }
@@ -161,7 +159,7 @@ fn check(path: &Path, records: &[Record], context: Context) -> Result<(Exit, Fil
                 claims: summaries(&certificate, &[]),
                 assumptions: certificate.assumptions().into_iter().map(Into::into).collect(),
             };
-            Ok((exit, summary))
+            Ok((exit, summary, record))
         }
     }
 }

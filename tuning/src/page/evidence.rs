@@ -23,7 +23,7 @@ const CONFIGURATIONS: usize = 120;
 pub fn evidence<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Result<CertificateRecord, Error> {
     let poles = poles::<N>(run, robot, gains)?;
     let slowest = poles.iter().flat_map(|poles| &poles.tuned).map(|pole| pole.re).reduce(f64::max);
-    let claims = || run.certificates.iter().flat_map(|certificate| &certificate.document().claims);
+    let claims = || run.certificates.iter().flat_map(|one| &one.certificate.document().claims);
     let find = |value: fn(&verify::Claim) -> Option<f64>| claims().find_map(|entry| value(&entry.claim));
     let certified_rate_per_s = find(|claim| match claim {
         verify::Claim::Exponential(claim) => Some(claim.rate_per_s.to_f64()),
@@ -34,7 +34,7 @@ pub fn evidence<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -
         _ => None,
     });
     let mut rows = Vec::new();
-    for certificate in &run.certificates {
+    for certune::Answer { certificate, .. } in &run.certificates {
         let entries = certificate.document().claims.iter().zip(certificate.checked());
         for ((entry, checked), growth) in entries.zip(growths::<N>(robot, certificate)?) {
             let mut row = claim_row(&entry.claim, checked, certificate, slowest);
@@ -45,7 +45,7 @@ pub fn evidence<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -
     let joined = |words: Vec<String>| words.join(", ");
     let files = Folder { path: PathBuf::new() }.certificates(run.file.certificates());
     let files = files.iter().take(run.certificates.len()).map(|path| path.display().to_string());
-    let hashes = run.certificates.iter().map(|certificate| certificate.document().sha256.clone());
+    let hashes = run.certificates.iter().map(|one| one.certificate.document().sha256.clone());
     let map = |poles| PoleMap { configurations: CONFIGURATIONS as u64, poles, certified_rate_per_s };
     Ok(CertificateRecord {
         file_name: joined(files.collect()),

@@ -39,7 +39,7 @@ pub fn slices<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> 
     let filter = StabilityFilter::<N>::new(robot, scenario, &task, record.question.search.seed, SAMPLES)?;
     let stable = |gains: &Gains| filter.growth_of(gains, task.step_s).is_some_and(|growth| growth.get() < 0.0);
     // The claim is about gains that all joints share.
-    let arms = run.certificates.first().map(|certificate| family_box(certificate.document()));
+    let arms = run.certificates.first().map(|one| family_box(one.certificate.document()));
     let arms = arms.filter(|_| written(&gains.tuned).is_some());
     let slice = |[x, y]: [&Knob; 2]| {
         let place = |gains: &Gains| [x.value(gains), y.value(gains)];

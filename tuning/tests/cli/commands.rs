@@ -187,9 +187,11 @@ fn gains_of_each_joint_and_adaptive_gains_have_claims_of_their_own() {
     let line = "certify --robot panda --gains equations.toml --gravity-compensation on --claim adaptive-convergence --out e.json";
     let made = json(folder.path(), line, 0);
     assert_eq!((&made["claims"][0]["verdict"], &made["claims"][0]["grade"]), (&"holds".into(), &"proved".into()));
-    // The enclosure over the goal's box is no built-in constant: its record is written beside the certificate, and asked for.
+    // The enclosure over the goal's box is no built-in constant: its record is written beside the certificate, and looked for there.
+    stdout(folder.path(), "verify e.json", 0);
+    std::fs::rename(folder.path().join("e.constants.json"), folder.path().join("moved.json")).unwrap();
     stdout(folder.path(), "verify e.json", 2);
-    stdout(folder.path(), "verify e.json --constants e.constants.json", 0);
+    stdout(folder.path(), "verify e.json --constants moved.json", 0);
 }
 
 #[test]
@@ -247,12 +249,11 @@ fn claims_rest_on_a_record_that_must_be_at_hand_and_follow_from_its_proofs() {
     let made = json(folder.path(), &format!("{certify} --constants r.json"), 0);
     assert_eq!(made["constants_sha256"], record.sha256.as_str());
     assert!(made["claims"].as_array().unwrap().iter().all(|claim| claim["grade"] == "proved"));
-    stdout(folder.path(), "verify c.json", 2);
-    stdout(folder.path(), "verify c.json --constants r.json", 0);
-    let full = json(folder.path(), "verify --full c.json --constants r.json --robot two.urdf", 2);
+    stdout(folder.path(), "verify c.json", 0);
+    let full = json(folder.path(), "verify --full c.json --robot two.urdf", 2);
     assert_eq!(full["constants"][0]["derived_again"], false);
     // Not a built-in robot: its file is asked for.
-    stdout(folder.path(), "verify --full c.json --constants r.json", 1);
+    stdout(folder.path(), "verify --full c.json", 1);
 }
 
 /// The recorded result of the main job is still accepted.

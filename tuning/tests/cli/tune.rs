@@ -115,11 +115,20 @@ fn mrac_is_tuned_and_certified_at_every_goal() {
     std::fs::create_dir(folder.path().join("out")).unwrap();
     std::fs::write(at("certificate.json"), "of an earlier run").unwrap();
     std::fs::write(at("certificate-3.json"), "of an earlier run").unwrap();
+    std::fs::write(at("certificate-3.constants.json"), "of an earlier run").unwrap();
     std::fs::write(at("certificate-mine.json"), "mine").unwrap();
     let line = "--robot panda --controller mrac --scenario easy.toml --budget 100 --plants 4 --seed 3 --out out";
     let run = json(folder.path(), line, 0);
-    let expected =
-        ["certificate-1.json", "certificate-2.json", "certificate-mine.json", "gains.toml", "report.html", "run.json"];
+    let expected = [
+        "certificate-1.constants.json",
+        "certificate-1.json",
+        "certificate-2.constants.json",
+        "certificate-2.json",
+        "certificate-mine.json",
+        "gains.toml",
+        "report.html",
+        "run.json",
+    ];
     assert_eq!(names(&folder.path().join("out")), expected);
     let cost = |side: &str| run["held_out"][side]["cost"].as_f64().unwrap();
     assert!(cost("tuned") < 0.7 * cost("published"), "{} against {}", cost("tuned"), cost("published"));
@@ -128,11 +137,11 @@ fn mrac_is_tuned_and_certified_at_every_goal() {
     assert!(claims.iter().all(|claim| claim["verdict"] == "holds" && claim["grade"] == "proved"));
     assert_eq!(run["gains"]["law"], "reference-model");
 
-    // These claims rest on constants around one goal, which no built-in record has: `certify` writes them beside its certificate.
-    let certify = "certify --robot panda --gains out/gains.toml --scenario easy.toml --at 0.3,0.4,0,-1.2,0,1.5,0 \
-                   --claim adaptive-convergence,pi-exponential --out again.json";
-    stdout(folder.path(), certify, 0);
-    stdout(folder.path(), "verify again.json --constants again.constants.json", 0);
+    // These claims rest on constants around one goal, which no built-in record has: they stand beside.
+    stdout(folder.path(), "verify out/certificate-1.json out/certificate-2.json", 0);
+    let page = read(at("report.html"));
+    stdout(folder.path(), "report out", 0);
+    assert!(read(at("report.html")) == page, "`report` makes another page than `tune`");
     let simulate = "simulate --robot panda --gains out/gains.toml --scenario easy.toml --friction 2.5";
     assert!(json(folder.path(), simulate, 0)["diverged_at_s"].is_null());
     let page = read(at("report.html"));

@@ -188,7 +188,7 @@ impl<const N: usize> ArmCertifier<N> {
                 };
                 let extra = at_one.iter().map(|_| self.lyapunov_at(aic, at_goal()?)).collect::<Result<_, _>>()?;
                 let certificate = checked(document, extra, problem.records())?;
-                Ok(Answer { certificate, records: problem.records().to_vec() })
+                Ok(Answer::new(certificate, problem.records()))
             }
             ArmGains::Mrac(mrac) => {
                 let delay_samples = u32::try_from(request.delay_samples.unwrap_or(0)).unwrap_or(u32::MAX);

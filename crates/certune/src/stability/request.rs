@@ -2,7 +2,7 @@
 
 use certune_bounds::SearchOptions;
 use certune_certify::{GoalListValues, Options};
-use certune_verify::{Certificate, ClaimKind, Record};
+use certune_verify::{Certificate, ClaimKind, Evidence, Record};
 
 use super::gains::ArmGains;
 
@@ -65,8 +65,21 @@ pub struct Request {
 pub struct Answer {
     /// The checked claims.
     pub certificate: Certificate,
-    /// The records of proved constants that it rests on: whoever checks it needs them.
-    pub records: Vec<Record>,
+    /// The record of proved constants that it rests on: whoever checks it needs it. None when they are sampled.
+    pub record: Option<Record>,
+}
+
+impl Answer {
+    /// A certificate with the one of the records that it names.
+    pub fn new(certificate: Certificate, records: &[Record]) -> Self {
+        let record = match &certificate.document().constants.evidence {
+            Evidence::Proved { record_sha256 } => {
+                records.iter().find(|record| record.sha256 == *record_sha256).cloned()
+            }
+            Evidence::Sampled { .. } => None,
+        };
+        Self { certificate, record }
+    }
 }
 
 /// The claims that apply to a controller with these gains, in the order in which they are examined.
