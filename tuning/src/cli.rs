@@ -159,6 +159,9 @@ pub struct TuneArgs {
     /// Folder for the results [default: runs/ROBOT-CONTROLLER-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
+    /// Watch the search on the whole screen: the best figure, what the best gains do, where the candidates lie
+    #[arg(long)]
+    pub dashboard: bool,
 }
 
 #[derive(Debug, Args)]
@@ -261,6 +264,9 @@ pub struct ResumeArgs {
     /// Threads; the result does not depend on it [default: one per core]
     #[arg(long, value_name = "T", value_parser = threads)]
     pub threads: Option<usize>,
+    /// Watch the search on the whole screen, as with `autotune tune`
+    #[arg(long)]
+    pub dashboard: bool,
 }
 
 #[derive(Debug, Args)]

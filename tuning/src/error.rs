@@ -69,6 +69,12 @@ pub enum Error {
     /// A run that would have nothing to be compared with.
     #[error("search space `{space}` says start = \"cold\", but a run is reported beside the gains that it starts from")]
     ColdStart { space: String },
+    /// A dashboard that nobody would see.
+    #[error("--dashboard draws on a terminal, and stderr is none")]
+    NoTerminal,
+    /// A terminal that cannot be drawn on.
+    #[error("cannot draw on the terminal: {0}")]
+    Screen(#[source] io::Error),
     /// Goals that make no front.
     #[error(transparent)]
     Front(#[from] certune::tune::front::FrontError),
@@ -174,6 +180,7 @@ impl Error {
             Self::Front(certune::tune::front::FrontError::Goals { .. }) => {
                 Some("--goals settling-time,jitter,certified-radius".to_owned())
             }
+            Self::NoTerminal | Self::Screen(_) => Some("the same without --dashboard".to_owned()),
             Self::NoPoint { .. } => Some("a number of the table in the front's folder, front.html".to_owned()),
             Self::PointRefused { .. } => Some("the front made again with this version".to_owned()),
             Self::ListLength { joints, .. } => Some(format!("{joints} numbers separated by commas, base to tip")),

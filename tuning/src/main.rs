@@ -25,6 +25,7 @@ mod catalogue;
 mod certificate;
 mod cli;
 mod commands;
+mod dashboard;
 mod error;
 mod interrupt;
 mod journal;

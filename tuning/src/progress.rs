@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use certune::tune::{Evaluation, Goal, Outcome, Progress, Source, Stage, TuneProgress};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 
+use crate::dashboard::Dashboard;
 use crate::output;
 
 const SPINNER: &str = "  {spinner} {msg}";
@@ -21,17 +22,28 @@ pub struct Terminal {
     verbose: bool,
     objective: Goal,
     began: Instant,
+    dashboard: Option<Dashboard>,
 }
 
 impl Terminal {
     pub fn new(verbose: bool) -> Self {
         let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
-        Self { bar, verbose, objective: Goal::SettlingCost, began: Instant::now() }
+        Self { bar, verbose, objective: Goal::SettlingCost, began: Instant::now(), dashboard: None }
     }
 
     /// The same for a search after another objective than the settling cost.
     pub fn after(self, objective: Goal) -> Self {
         Self { objective, ..self }
+    }
+
+    /// The same on the whole screen: no line, and none that stays.
+    pub fn with(self, dashboard: Dashboard) -> Self {
+        self.bar.set_draw_target(ProgressDrawTarget::hidden());
+        Self { verbose: false, dashboard: Some(dashboard), ..self }
+    }
+
+    pub fn dashboard(&self) -> Option<&Dashboard> {
+        self.dashboard.as_ref()
     }
 
     /// An outcome in words.
@@ -44,6 +56,9 @@ impl Terminal {
         self.bar.set_style(style(SPINNER));
         self.bar.set_message(what.to_owned());
         self.bar.enable_steady_tick(Duration::from_millis(120));
+        if let Some(dashboard) = &self.dashboard {
+            dashboard.stage(what);
+        }
         self.detail(|| format!("[{:5.1} s] {what}", self.began.elapsed().as_secs_f64()));
     }
 
@@ -69,8 +84,11 @@ impl Terminal {
         }
     }
 
-    /// Wipes the line.
+    /// Wipes the line, or leaves the screen.
     pub fn finish(&self) {
+        if let Some(dashboard) = &self.dashboard {
+            dashboard.close();
+        }
         self.bar.finish_and_clear();
     }
 
@@ -125,6 +143,9 @@ impl Progress for Terminal {
         self.bar.set_length(evaluations as u64);
         self.bar.set_position(done as u64);
         self.bar.set_message(format!("best {}", self.in_words(best.outcome)));
+        if let Some(dashboard) = &self.dashboard {
+            dashboard.evaluated(done, evaluations, evaluation, best, self.in_words(best.outcome));
+        }
         if evaluation.index == best.index {
             self.detail(|| {
                 format!(
@@ -146,6 +167,9 @@ impl TuneProgress for Terminal {
                 self.bar.disable_steady_tick();
                 self.bar.set_style(style(BAR));
                 self.bar.set_message("first candidate");
+                if let Some(dashboard) = &self.dashboard {
+                    dashboard.stage("searching");
+                }
                 self.detail(|| format!("[{:5.1} s] search", self.elapsed_s()));
             }
             Stage::WorstPlant { round } => {

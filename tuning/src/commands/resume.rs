@@ -5,7 +5,7 @@ use std::path::Path;
 use certune::family_of;
 use certune::tune::{Setting, SpaceFile};
 
-use super::tune::{Plan, carry_out, inertia_kg_m2};
+use super::tune::{Plan, carry_out, inertia_kg_m2, watched};
 use crate::catalogue;
 use crate::cli::{Context, Exit, ResumeArgs};
 use crate::error::Error;
@@ -17,7 +17,9 @@ pub fn run(args: &ResumeArgs, context: Context) -> Result<Exit, Error> {
     // Without a slash at its end, the folder is named as in the run's own commands.
     let folder = Folder { path: args.run_dir.components().collect() };
     let (header, journal) = Journal::open(&folder)?;
-    carry_out(&plan(header, folder)?, journal, args.threads, context)
+    let plan = plan(header, folder)?;
+    let progress = watched(&plan, args.dashboard, context)?;
+    carry_out(&plan, journal, args.threads, &progress, context)
 }
 
 /// The plan of the run that the header is of, with the files as they are now.

@@ -2,6 +2,7 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use certune::certify::FamilyValues;
@@ -21,11 +22,12 @@ use serde::Serialize;
 use super::claims::{ClaimSummary, claims_in_words, growths, summaries};
 use crate::catalogue::{self, GainsSource, SpaceSource, default_preset};
 use crate::cli::{Context, ControllerName, Exit, TuneArgs};
+use crate::dashboard::Dashboard;
 use crate::error::Error;
 use crate::interrupt::flag_of_ctrl_c;
 use crate::journal::{Header, Journal, Journalled};
 use crate::output::{self, table};
-use crate::page::{self, FIGURES, Spread, percent_of_tail, spread};
+use crate::page::{self, FIGURES, Spread, largest_error, percent_of_tail, spread};
 use crate::progress::{Terminal, achieved};
 use crate::promise::{self, Promised};
 use crate::run::{Folder, Run, RunFile};
@@ -77,10 +79,11 @@ struct Compared {
 
 pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
     let plan = plan(args)?;
+    let progress = watched(&plan, args.dashboard, context)?;
     let existed = plan.folder.path.exists();
     output::prepare_folder(&plan.folder.path)?;
-    let outcome =
-        Journal::begin(&plan.folder, &plan.header).and_then(|journal| carry_out(&plan, journal, args.threads, context));
+    let outcome = Journal::begin(&plan.folder, &plan.header)
+        .and_then(|journal| carry_out(&plan, journal, args.threads, &progress, context));
     if outcome.is_err() && !existed {
         // Only a folder that is empty goes; what keeps it from going is no part of the message.
         let _ = std::fs::remove_dir(&plan.folder.path);
@@ -88,11 +91,23 @@ pub fn run(args: &TuneArgs, context: Context) -> Result<Exit, Error> {
     outcome
 }
 
+/// What shows how the run is coming along.
+pub fn watched(plan: &Plan, dashboard: bool, context: Context) -> Result<Terminal, Error> {
+    let objective = plan.header.question.goals.objective;
+    let progress = Terminal::new(context.verbose).after(objective);
+    Ok(if dashboard { progress.with(Dashboard::open(&plan.space, objective)?) } else { progress })
+}
+
 /// Does what is planned and not in the journal yet.
-pub fn carry_out(plan: &Plan, mut journal: Journal, threads: Option<usize>, context: Context) -> Result<Exit, Error> {
+pub fn carry_out(
+    plan: &Plan,
+    mut journal: Journal,
+    threads: Option<usize>,
+    progress: &Terminal,
+    context: Context,
+) -> Result<Exit, Error> {
     let question = &plan.header.question;
-    let progress = Terminal::new(context.verbose).after(question.goals.objective);
-    let outcome = tune_on(plan, &mut journal, threads.unwrap_or(0), &progress);
+    let outcome = tune_on(plan, &mut journal, threads.unwrap_or(0), progress);
     progress.finish();
     let (run, page, growth) = match outcome {
         Ok(found) => found,
@@ -254,6 +269,9 @@ fn tune_on(plan: &Plan, journal: &mut Journal, threads: usize, progress: &Termin
         .build()
         .map_err(|source| Error::Threads { threads, source })?;
     let stop = flag_of_ctrl_c()?;
+    if let Some(dashboard) = progress.dashboard() {
+        dashboard.leave_at(Arc::clone(&stop));
+    }
     pool.install(|| {
         for_joint_count!(plan.robot.joints(), N => tune_arm::<N>(plan, journal, &stop, progress))
             .unwrap_or_else(|| Err(catalogue::too_many_joints(&plan.robot)))
@@ -282,6 +300,9 @@ fn tune_arm<const N: usize>(
     let goals = objective.batch().resolved(question.goals.clone(), start);
     let simulated = objective.with_goals(&goals, &certifier).hardest_first(start);
     let judge = judge.with_goals(&goals.for_comparison());
+    if let Some(dashboard) = progress.dashboard() {
+        dashboard.respond_with(largest_error::<N>(robot, scenario)?);
+    }
     let question = Question { goals, ..question.clone() };
     let objective: Box<dyn Objective> = match start {
         Gains::Aic(_) => Box::new(simulated),

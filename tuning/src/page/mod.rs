@@ -23,6 +23,7 @@ use crate::promise;
 use crate::run::{Folder, Run};
 
 pub use figures::{FIGURES, Spread, spread};
+pub use runs::largest_error;
 
 /// Two values this close, as a fraction of the range, are called the same.
 const ON_BOUND: f64 = 0.005;

@@ -1,7 +1,8 @@
 //! Runs that are simulated again for their curves: the nominal plant, and the held-out plants.
 
 use certune::closed_loop::{
-    Gains, Metrics, NoiseStream, Plant, PlantBox, PlantSetting, Row, Sample, Segment, Task, Trajectory, simulate,
+    Gains, Metrics, NoiseStream, Plant, PlantBox, PlantSetting, Row, Sample, Scenario, Segment, Task, Trajectory,
+    simulate,
 };
 use certune::control::Controller;
 use certune::control::aic::{Aic, AicParams, AicState};
@@ -16,6 +17,7 @@ use certune::tune::{Batch, Goal, PlantResult, Verdict};
 use certune::{ArmGains, StabilityError};
 use rayon::prelude::*;
 
+use crate::commands::tune::misfit;
 use crate::error::Error;
 use crate::run::Run;
 
@@ -51,6 +53,43 @@ pub fn middle(plants: &PlantBox) -> Middle {
     }
 }
 
+/// The plant in the middle of a box.
+fn nominal<const N: usize>(robot: &Robot, plants: &PlantBox) -> Result<Plant<N>, Error> {
+    let centre = middle(plants);
+    let setting = PlantSetting::nominal(robot, plants.gravity_compensation)
+        .with_payload(centre.payload_kg)
+        .with_friction(centre.friction_n_m_s_per_rad)
+        .with_rotor_inertia(centre.rotor_inertia_kg_m2);
+    Ok(Plant::new(robot, &setting)?)
+}
+
+/// A function from gains to the largest joint error on that plant over time, s and rad; empty for gains that do not fit.
+pub fn largest_error<const N: usize>(
+    robot: &Robot,
+    scenario: &Scenario,
+) -> Result<impl Fn(&Gains) -> Vec<(f64, f64)> + Send + use<N>, Error> {
+    let plant = nominal::<N>(robot, &scenario.plant_box)?;
+    let task = scenario.bind::<N>(robot).map_err(|error| misfit(robot, scenario, error.into()))?;
+    let noise = NoiseStream::default();
+    Ok(move |gains: &Gains| {
+        let Ok(bound) = ArmGains::<N>::bind(gains) else { return Vec::new() };
+        let curves = match bound {
+            ArmGains::Aic(gains) => {
+                AicParams::new(&gains, task.step_s).map(|of| curves(&plant, &task, &Aic::new(&of), noise, |_| None))
+            }
+            ArmGains::Mrac(gains) => {
+                MracParams::new(&gains, task.step_s).map(|of| curves(&plant, &task, &Mrac::new(&of), noise, |_| None))
+            }
+        };
+        let Ok((Curves { time_s, q_rad, goal_rad, .. }, _)) = curves else { return Vec::new() };
+        let largest = |row: usize| {
+            let errors = q_rad.iter().zip(&goal_rad).map(|(q, goal)| (q[row] - goal[row]).abs());
+            errors.fold(0.0, f64::max)
+        };
+        time_s.iter().enumerate().map(|(row, t_s)| (*t_s, largest(row))).collect()
+    })
+}
+
 /// Simulates both sets of gains.
 pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Result<Runs, Error> {
     let record = &run.file.record;
@@ -58,12 +97,7 @@ pub fn runs<const N: usize>(run: &Run, robot: &Robot, gains: &Pair<Gains>) -> Re
     let seed = question.search.seed;
     let goals = question.goals.for_comparison();
     let batch = Batch::<N>::held_out(robot, scenario, seed, question.held_out_plants)?.with_goals(&goals);
-    let centre = middle(&scenario.plant_box);
-    let setting = PlantSetting::nominal(robot, scenario.plant_box.gravity_compensation)
-        .with_payload(centre.payload_kg)
-        .with_friction(centre.friction_n_m_s_per_rad)
-        .with_rotor_inertia(centre.rotor_inertia_kg_m2);
-    let nominal = Plant::<N>::new(robot, &setting)?;
+    let nominal = nominal::<N>(robot, &scenario.plant_box)?;
     let noise = NoiseStream { seed, index: 0 };
     let course = |gains: &Gains| course(gains, &nominal, noise, &batch);
     let Course { curves: published, metrics: published_metrics, bands: published_bands, costs: published_costs } =
