@@ -57,8 +57,13 @@ fn refused() -> Result<String, Box<dyn Error>> {
     let mut record = synthetic::record();
     let [refused, open] = record.certificate.claims.as_mut_slice() else { return Err("expected two claims".into()) };
     refused.verdict = Verdict::Refused;
+    refused.margins.clear();
     refused.counterexample = vec!["q = (0.1, 1.2, 0, −1.4, 0, 2, 0) rad: eigenvalue 0.31 ± 2.2i /s".to_owned()];
     open.verdict = Verdict::NotProved;
+    open.margins.clear();
+    if let Some(region) = &mut record.certificate.region {
+        region.radius_rad = None;
+    }
     let run = &mut record.response.runs.published;
     for torque in &mut run.tau_n_m {
         torque[2000..].fill(f64::NAN);
