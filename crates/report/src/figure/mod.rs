@@ -9,11 +9,13 @@
 mod axis;
 mod ink;
 mod plot;
+mod readings;
 mod thin;
 
 pub(crate) use axis::{Axis, row_at};
 pub(crate) use ink::Ink;
-pub(crate) use plot::{Anchor, Mark, Plot};
+pub(crate) use plot::{Anchor, Geometry, Mark, Plot};
+pub(crate) use readings::{Reading, Readings, embedded};
 pub(crate) use thin::{corners, finite_runs, on_grid, thin};
 
 /// Smallest and largest finite value.

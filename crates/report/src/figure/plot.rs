@@ -5,10 +5,12 @@ use plotters::element::{Circle, PathElement, Polygon, Rectangle, Text};
 use plotters::prelude::{Color, DrawingArea, IntoDrawingArea, SVGBackend, ShapeStyle};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontStyle, IntoFont, TextStyle};
+use serde::Serialize;
 
 use super::Axis;
 use super::ink::Ink;
 use super::thin::{Point, finite_runs};
+use super::readings::Readings;
 use crate::error::ReportError;
 
 /// Canvas units a nominal pixel: plotters rounds to whole units.
@@ -75,6 +77,17 @@ pub(crate) enum Anchor {
     End,
 }
 
+/// Where values lie in a drawing: for scripts that read or move it.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Geometry {
+    /// Left, right, top and bottom of the axes, in units of the view box.
+    frame: [f64; 4],
+    /// Range of the horizontal axis.
+    x: (f64, f64),
+    /// Range of the vertical axis.
+    y: (f64, f64),
+}
+
 /// The rectangle of the axes, in nominal pixels.
 struct Frame {
     left: f64,
@@ -104,8 +117,40 @@ impl Plot {
         let (width, height) = (units(self.size.0), units(self.size.1));
         let (title, description) = (escaped(&self.title), escaped(&self.description));
         Ok(format!(
-            "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}. {description}\"><title>{title}</title>{body}"
+            "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\"><title>{title}</title><desc>{description}</desc>{body}"
         ))
+    }
+
+    /// [`Plot::svg`], followed by the values that a script reads off it.
+    ///
+    /// # Errors
+    /// As [`Plot::svg`], and [`ReportError::Json`].
+    pub(crate) fn svg_with(&self, readings: &Readings) -> Result<String, ReportError> {
+        let data = readings.json(self.geometry())?;
+        Ok(format!("{}<script type=\"application/json\" class=\"readings\">{data}</script>", self.svg()?))
+    }
+
+    /// Where values lie in the drawing.
+    pub(crate) fn geometry(&self) -> Geometry {
+        let Frame { left, right, top, bottom } = self.frame();
+        Geometry {
+            frame: [left, right, top, bottom].map(|length| f64::from(units(length))),
+            x: self.x.range(),
+            y: self.y.range(),
+        }
+    }
+
+    /// Where a point lies in the drawing, in units of the view box; `None` for a NaN.
+    pub(crate) fn place(&self, point: Point) -> Option<(i32, i32)> {
+        self.at(&self.frame(), point).map(pixel)
+    }
+
+    /// Changes the height so that a unit of both axes has the same length.
+    pub(crate) fn true_to_scale(mut self) -> Self {
+        let Frame { left, right, .. } = self.frame();
+        let ((x0, x1), (y0, y1)) = (self.x.range(), self.y.range());
+        self.size.1 = TOP + BOTTOM + (right - left) * (y1 - y0) / (x1 - x0);
+        self
     }
 
     fn draw(&self, buffer: &mut String) -> Drawn {
