@@ -23,8 +23,8 @@
 
 mod answer;
 mod check;
-mod comparison;
 mod claims;
+mod comparison;
 mod error;
 mod figure;
 mod format;

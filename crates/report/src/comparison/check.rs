@@ -77,7 +77,8 @@ fn experiment_holds(experiment: &Experiment, known: &HashSet<&str>) -> Checked {
         for row in rows {
             length("cells of a table", columns.len(), row.cells.len())?;
             let id = row.controller.iter();
-            id.into_iter().try_for_each(|id| is_known(id, known, || format!("the table `{caption}`"), "a controller"))?;
+            id.into_iter()
+                .try_for_each(|id| is_known(id, known, || format!("the table `{caption}`"), "a controller"))?;
         }
     }
     Ok(())
@@ -159,7 +160,8 @@ fn no_proof(record: &ComparisonReport) -> Checked {
 /// Whether a text speaks of a proof without denying it.
 fn claims_proof(text: &str) -> bool {
     let text = text.to_lowercase();
-    let words: Vec<&str> = text.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
+    let words: Vec<&str> =
+        text.split(|letter: char| !letter.is_alphanumeric()).filter(|word| !word.is_empty()).collect();
     words.iter().enumerate().any(|(index, word)| {
         let before = &words[index.saturating_sub(SHORTLY)..index];
         matches!(*word, "proved" | "proven" | "proves") && !before.iter().any(|word| DENIALS.contains(word))

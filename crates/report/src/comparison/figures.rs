@@ -73,7 +73,8 @@ struct RowView<'a, C> {
 /// [`ReportError::Draw`] and [`ReportError::Json`].
 pub(super) fn figure<'a>(figure: &'a ExperimentFigure, cast: Cast<'a>) -> Result<FigureView<'a>, ReportError> {
     let ExperimentFigure { id, title, caption, drawing } = figure;
-    let mut view = FigureView { id, title, caption, key: Vec::new(), has_goal: false, band: "", drawn: Drawn::default() };
+    let mut view =
+        FigureView { id, title, caption, key: Vec::new(), has_goal: false, band: "", drawn: Drawn::default() };
     match drawing {
         Drawing::Responses(responses) => {
             let curves = responses.panels.iter().flat_map(|panel| &panel.curves);

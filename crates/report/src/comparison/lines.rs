@@ -6,7 +6,7 @@ use crate::error::ReportError;
 use crate::figure::{Anchor, Axis, Ink, Mark, Plot, finite_runs, span, thin};
 use crate::format;
 use crate::panels::{CURVE_POINTS, TwoWidths, curve};
-use crate::record::{Lines, LineSeries, Quantity};
+use crate::record::{LineSeries, Lines, Quantity};
 
 /// A curve of at most this many points shows each as a dot.
 const DOTTED: usize = 40;
@@ -30,7 +30,8 @@ fn plot(title: &str, lines: &Lines, cast: Cast<'_>, size: (f64, f64)) -> Plot {
         let text = limit.name.clone();
         marks.push(Mark::Label { ink: Ink::Axis, text, at, shift: (4.0, -8.0), anchor: Anchor::Start });
     }
-    let named: Vec<_> = lines.series.iter().filter_map(|series| Some((cast.player(&series.controller)?, series))).collect();
+    let named: Vec<_> =
+        lines.series.iter().filter_map(|series| Some((cast.player(&series.controller)?, series))).collect();
     for (player, series) in &named {
         let ends = series.lower.iter().zip(&series.upper);
         let points = series.x.iter().zip(ends).map(|(x, (lower, upper))| (*x, *lower, *upper)).collect();

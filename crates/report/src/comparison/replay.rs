@@ -65,12 +65,24 @@ pub(super) fn replay<'a>(replay: &'a Replay, cast: Cast<'a>) -> Result<ReplayVie
     let points = || runs.iter().flat_map(|(_, _, frames)| frames).flatten().copied().chain(ground());
     let range = |of: fn(Point) -> f64| span(points().map(of)).unwrap_or((0.0, 1.0));
     let (x, y) = (range(|point| point.0), range(|point| point.1));
-    let mut view = ReplayView { caption: &replay.caption, duration_s: 0.0, step_s: replay.step_s, runs: Vec::new(), data: String::new() };
+    let mut view = ReplayView {
+        caption: &replay.caption,
+        duration_s: 0.0,
+        step_s: replay.step_s,
+        runs: Vec::new(),
+        data: String::new(),
+    };
     let mut data = Data { step_s: replay.step_s, runs: Vec::new() };
     for (player, run, frames) in runs {
         let plot = plot(&player, &frames, x, y);
-        let placed = |frame: &Vec<Point>| frame.iter().filter_map(|point| plot.place(*point)).flat_map(|(x, y)| [x, y]).collect();
-        data.runs.push(RunData { ink: player.ink.sentinel(), end: &run.end, frames: frames.iter().map(placed).collect() });
+        let placed = |frame: &Vec<Point>| {
+            frame.iter().filter_map(|point| plot.place(*point)).flat_map(|(x, y)| [x, y]).collect()
+        };
+        data.runs.push(RunData {
+            ink: player.ink.sentinel(),
+            end: &run.end,
+            frames: frames.iter().map(placed).collect(),
+        });
         view.duration_s = view.duration_s.max(replay.step_s * (frames.len().saturating_sub(1)) as f64);
         view.runs.push(RunView { player, end: &run.end, svg: plot.svg()? });
     }
@@ -84,9 +96,10 @@ fn plot(player: &Player<'_>, frames: &[Vec<Point>], x: Point, y: Point) -> Plot 
     let line = |ink, width, points| Mark::Line { ink, width, points };
     Plot {
         title: format!("Arm under {}", player.name),
-        description: "Stick figure, seen from the front right: grey where the run starts, in colour where it ends, and \
+        description:
+            "Stick figure, seen from the front right: grey where the run starts, in colour where it ends, and \
                       the way of the hand between."
-            .to_owned(),
+                .to_owned(),
         size: (WIDTH, WIDTH),
         x: Axis::padded("across (m)", x, 5),
         y: Axis::padded("up the view (m)", y, 5),

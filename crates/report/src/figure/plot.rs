@@ -9,8 +9,8 @@ use serde::Serialize;
 
 use super::Axis;
 use super::ink::Ink;
-use super::thin::{Point, finite_runs};
 use super::readings::Readings;
+use super::thin::{Point, finite_runs};
 use crate::error::ReportError;
 
 /// Canvas units a nominal pixel: plotters rounds to whole units.

@@ -69,12 +69,7 @@ impl Readings {
             let (value, lower, upper) = series(one);
             EmbeddedSeries { name: &one.name, ink: one.ink.sentinel(), value, lower, upper }
         });
-        embedded(&Embedded {
-            geometry,
-            unit: &self.unit,
-            time_s: chosen(&self.time_s),
-            series: series.collect(),
-        })
+        embedded(&Embedded { geometry, unit: &self.unit, time_s: chosen(&self.time_s), series: series.collect() })
     }
 }
 

@@ -81,7 +81,8 @@ fn positions() -> ExperimentFigure {
 
 fn torques() -> ExperimentFigure {
     let limit = |joint: usize| if joint < 4 { 87.0 } else { 12.0 };
-    let limits = |joint| [-limit(joint), limit(joint)].map(|value| Limit { name: text("torque limit"), value }).to_vec();
+    let limits =
+        |joint| [-limit(joint), limit(joint)].map(|value| Limit { name: text("torque limit"), value }).to_vec();
     let panel = |at: usize| ResponsePanel {
         name: format!("joint {}", at + 1),
         goal: Vec::new(),
@@ -158,7 +159,10 @@ fn spread() -> ExperimentFigure {
         drawing: Drawing::Spread(Spread {
             panels: vec![
                 SpreadPanel { quantity: quantity("settling time", "s", false), rows: all(0.0, 12) },
-                SpreadPanel { quantity: quantity("torque rate, rms", "N m/s", true), rows: (0..7).map(jitter).collect() },
+                SpreadPanel {
+                    quantity: quantity("torque rate, rms", "N m/s", true),
+                    rows: (0..7).map(jitter).collect(),
+                },
                 SpreadPanel {
                     quantity: quantity("deviation under payload", "mrad", false),
                     rows: ["0.1 kg", "0.7 kg"]
@@ -222,7 +226,8 @@ fn transfer() -> ExperimentFigure {
 }
 
 fn table() -> FigureTable {
-    let columns = [("settling", "s"), ("final error", "mrad"), ("overshoot", "%"), ("peak torque", "N m"), ("note", "")];
+    let columns =
+        [("settling", "s"), ("final error", "mrad"), ("overshoot", "%"), ("peak torque", "N m"), ("note", "")];
     let row = |one: usize| TableRow {
         controller: Some(id(one)),
         name: String::new(),
@@ -276,8 +281,12 @@ fn statements() -> Vec<Statement> {
         Statement {
             number: k as u32 + 1,
             section: format!("V-{}, fig. {}", ["A", "B", "C"][k % 3], k % 6 + 2),
-            statement: text("The active inference controller reaches every goal without overshoot, although masses are wrong by 20 %."),
-            measured: text("Largest overshoot 0.4 % on 200 arms whose masses are drawn from ±20 %; settling 4.03 to 4.12 s."),
+            statement: text(
+                "The active inference controller reaches every goal without overshoot, although masses are wrong by 20 %.",
+            ),
+            measured: text(
+                "Largest overshoot 0.4 % on 200 arms whose masses are drawn from ±20 %; settling 4.03 to 4.12 s.",
+            ),
             agreement,
             condition: if agreement == Agreement::AgreesOnlyIf { text(condition) } else { String::new() },
             figure: (k % 5 != 4).then(|| text(figures[k % 6])),
@@ -307,10 +316,14 @@ pub fn comparison() -> ComparisonReport {
     };
     ComparisonReport {
         about: text("Comparison with Pezzato, Ferrari, Hernandez Corbato, RA-L 2020 · panda · seed 7"),
-        headline: text("Active inference is the smoother controller, the adaptive one the stiffer; neither needs a model"),
+        headline: text(
+            "Active inference is the smoother controller, the adaptive one the stiffer; neither needs a model",
+        ),
         answer: vec![
             text("Of 14 statements of the paper, 7 agree with simulation, 4 agree under a condition, 3 do not."),
-            text("With tuned gains the active inference controller settles in 2.9 s instead of 4.1 s on 200 random arms."),
+            text(
+                "With tuned gains the active inference controller settles in 2.9 s instead of 4.1 s on 200 random arms.",
+            ),
         ],
         assumptions: vec![
             text("Arms: the Panda with hand, link masses drawn from ±20 %."),
@@ -320,8 +333,14 @@ pub fn comparison() -> ComparisonReport {
         controllers: controllers.to_vec(),
         statements: statements(),
         findings: vec![
-            Finding { title: text("The released code has no reference model"), text: text("Its adaptation follows the goal itself, so torques jump with it.") },
-            Finding { title: text("Three links of the released arm have impossible inertias"), text: text("Links 3 and 5 are indefinite; the simulator does not say so.") },
+            Finding {
+                title: text("The released code has no reference model"),
+                text: text("Its adaptation follows the goal itself, so torques jump with it."),
+            },
+            Finding {
+                title: text("Three links of the released arm have impossible inertias"),
+                text: text("Links 3 and 5 are indefinite; the simulator does not say so."),
+            },
         ],
         experiments: vec![
             experiment("steps", "Reaching goals", vec![positions(), torques(), spread()], vec![table()]),
