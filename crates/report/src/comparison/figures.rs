@@ -52,8 +52,15 @@ struct GridCellView<'a> {
 pub(super) struct TableView<'a> {
     caption: &'a str,
     row_name: &'a str,
-    columns: &'a [Column],
+    columns: Vec<ColumnView<'a>>,
     rows: Vec<RowView<'a, CellView>>,
+}
+
+#[derive(Debug, Serialize)]
+struct ColumnView<'a> {
+    #[serde(flatten)]
+    column: &'a Column,
+    has_numbers: bool,
 }
 
 #[derive(Debug, Serialize)]
@@ -78,7 +85,9 @@ pub(super) fn figure<'a>(figure: &'a ExperimentFigure, cast: Cast<'a>) -> Result
     match drawing {
         Drawing::Responses(responses) => {
             let curves = responses.panels.iter().flat_map(|panel| &panel.curves);
-            view.key = cast.players(curves.map(|curve| &curve.controller));
+            if responses.panels.len() > 1 {
+                view.key = cast.players(curves.map(|curve| &curve.controller));
+            }
             view.has_goal = responses.panels.iter().any(|panel| !panel.goal.is_empty());
             view.band = &responses.band;
             view.drawn = responses::draw(responses, cast)?;
@@ -118,7 +127,11 @@ pub(super) fn table<'a>(table: &'a FigureTable, cast: Cast<'a>) -> TableView<'a>
         });
         RowView { player: player(row.controller.as_ref(), cast), name: &row.name, cells: cells.collect() }
     });
-    TableView { caption: &table.caption, row_name: &table.row_name, columns: &table.columns, rows: rows.collect() }
+    let columns = table.columns.iter().enumerate().map(|(at, column)| {
+        let cells = table.rows.iter().filter_map(|row| row.cells.get(at));
+        ColumnView { column, has_numbers: cells.into_iter().any(|cell| matches!(cell, Cell::Number(_))) }
+    });
+    TableView { caption: &table.caption, row_name: &table.row_name, columns: columns.collect(), rows: rows.collect() }
 }
 
 fn player<'a>(id: Option<&String>, cast: Cast<'a>) -> Option<Player<'a>> {

@@ -3,7 +3,7 @@
 use super::cast::Cast;
 use super::figures::Drawn;
 use crate::error::ReportError;
-use crate::figure::{Anchor, Axis, Ink, Mark, Plot, finite_runs, span, thin};
+use crate::figure::{Anchor, Axis, Ink, Mark, Plot, band_opacity, finite_runs, span, thin};
 use crate::format;
 use crate::panels::{CURVE_POINTS, TwoWidths, curve};
 use crate::record::{LineSeries, Lines, Quantity};
@@ -35,7 +35,7 @@ fn plot(title: &str, lines: &Lines, cast: Cast<'_>, size: (f64, f64)) -> Plot {
     for (player, series) in &named {
         let ends = series.lower.iter().zip(&series.upper);
         let points = series.x.iter().zip(ends).map(|(x, (lower, upper))| (*x, *lower, *upper)).collect();
-        marks.push(Mark::Band { ink: player.ink, points });
+        marks.push(Mark::Band { ink: player.ink, opacity: band_opacity(named.len()), points });
     }
     let (mut longest, mut summary) = (0, Vec::new());
     for (player, series) in &named {

@@ -50,6 +50,7 @@ struct Verdict {
     class: &'static str,
     symbol: &'static str,
     words: &'static str,
+    words_of_many: &'static str,
 }
 
 /// How many statements have a verdict.
@@ -112,12 +113,12 @@ pub fn comparison_report(record: &ComparisonReport) -> Result<String, ReportErro
 }
 
 fn verdict(agreement: Agreement) -> Verdict {
-    let (class, symbol, words) = match agreement {
-        Agreement::Agrees => ("agrees", "✓", "agrees"),
-        Agreement::AgreesOnlyIf => ("only-if", "◐", "agrees only if"),
-        Agreement::DoesNotAgree => ("differs", "✗", "does not agree"),
+    let (class, symbol, words, words_of_many) = match agreement {
+        Agreement::Agrees => ("agrees", "✓", "agrees", "agree"),
+        Agreement::AgreesOnlyIf => ("only-if", "◐", "agrees only if", "agree on a condition"),
+        Agreement::DoesNotAgree => ("differs", "✗", "does not agree", "do not agree"),
     };
-    Verdict { class, symbol, words }
+    Verdict { class, symbol, words, words_of_many }
 }
 
 fn tally(statements: &[Statement]) -> Vec<Tally> {

@@ -23,12 +23,12 @@ const BELOW: f64 = 0.14;
 pub(super) fn draw(panel: &SpreadPanel, cast: Cast<'_>) -> Result<String, ReportError> {
     let axis = axis(panel);
     let (start, end) = axis.range();
-    let (mut marks, mut summary, mut strip, mut category) = (Vec::new(), Vec::new(), 0, "");
+    let (mut marks, mut summary, mut strip, mut category) = (vec![Mark::Ticks], Vec::new(), 0, "");
     for row in &panel.rows {
         if row.category != category {
             let text = row.category.clone();
             let at = (start, row_at(strip));
-            marks.push(Mark::Label { ink: Ink::Axis, text, at, shift: (-36.0, 8.0), anchor: Anchor::Start });
+            marks.push(Mark::Label { ink: Ink::Text, text, at, shift: (-36.0, 8.0), anchor: Anchor::Start });
             strip += 1;
             category = &row.category;
         }
@@ -47,7 +47,7 @@ pub(super) fn draw(panel: &SpreadPanel, cast: Cast<'_>) -> Result<String, Report
         description: format!("One dot an arm. {}.", summary.join("; ")),
         size: (HALF.0, AROUND + STRIP * f64::from(strip as u32)),
         x: axis,
-        y: Axis::rows((0..strip).map(|_| String::new())),
+        y: Axis::strips(strip),
         right: 14.0,
         marks,
     }
@@ -87,8 +87,11 @@ fn axis(panel: &SpreadPanel) -> Axis {
     } else {
         let (lower, upper) = span(values()).unwrap_or((0.0, 1.0));
         // Zero is shown where it is not far: lengths then compare.
-        let lower = if lower > 0.0 && lower < 0.5 * upper { 0.0 } else { lower };
-        Axis::padded(caption, (lower, upper), 6)
+        if lower >= 0.0 && lower < 0.5 * upper {
+            Axis::linear(caption, (0.0, 1.05 * upper), 6)
+        } else {
+            Axis::padded(caption, (lower, upper), 6)
+        }
     }
 }
 

@@ -18,6 +18,11 @@ pub(crate) use plot::{Anchor, Geometry, Mark, Plot};
 pub(crate) use readings::{Reading, Readings, embedded};
 pub(crate) use thin::{corners, finite_runs, on_grid, thin};
 
+/// How strongly one of several bands over each other is drawn: the more there are, the paler.
+pub(crate) fn band_opacity(bands: usize) -> f64 {
+    0.35 / (bands.max(1) as f64 + 0.6)
+}
+
 /// Smallest and largest finite value.
 pub(crate) fn span(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
     values.into_iter().filter(|value| value.is_finite()).fold(None, |span, value| match span {

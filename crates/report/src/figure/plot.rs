@@ -52,7 +52,7 @@ pub(crate) enum Mark {
     /// A curve.
     Line { ink: Ink, width: f64, points: Vec<Point> },
     /// The area between two curves: `(x, lower, upper)`.
-    Band { ink: Ink, points: Vec<(f64, f64, f64)> },
+    Band { ink: Ink, opacity: f64, points: Vec<(f64, f64, f64)> },
     /// Points.
     Dots { ink: Ink, radius: f64, opacity: f64, points: Vec<Point> },
     /// A rectangle between two corners.
@@ -61,6 +61,8 @@ pub(crate) enum Mark {
     Bar { ink: Ink, opacity: f64, height: f64, from: Point, to_x: f64 },
     /// A vertical line.
     Vertical { ink: Ink, x: f64 },
+    /// A vertical line at each tick.
+    Ticks,
     /// A horizontal line.
     Horizontal { ink: Ink, y: f64 },
     /// Words at a point, moved by nominal pixels.
@@ -208,14 +210,14 @@ impl Plot {
                     line(area, *ink, *width, &place(run))?;
                 }
             }
-            Mark::Band { ink, points } => {
+            Mark::Band { ink, opacity, points } => {
                 let whole = |p: &&(f64, f64, f64)| p.0.is_finite() && p.1.is_finite() && p.2.is_finite();
                 let lower = points.iter().filter(whole).map(|(x, lower, _)| (*x, *lower));
                 let upper = points.iter().rev().filter(whole).map(|(x, _, upper)| (*x, *upper));
                 let outline = place(&lower.chain(upper).collect::<Vec<_>>());
                 if outline.len() > 2 {
                     let outline: Vec<_> = outline.into_iter().map(pixel).collect();
-                    area.draw(&Polygon::new(outline, ink.color().mix(0.22)))?;
+                    area.draw(&Polygon::new(outline, ink.color().mix(*opacity)))?;
                 }
             }
             Mark::Dots { ink, radius, opacity, points } => {
@@ -237,6 +239,11 @@ impl Plot {
             Mark::Vertical { ink, x } => {
                 if let Some((x, _)) = self.at(frame, (*x, self.y.range().0)) {
                     line(area, *ink, 1.2, &[(x, frame.top), (x, frame.bottom)])?;
+                }
+            }
+            Mark::Ticks => {
+                for (value, _) in self.x.ticks() {
+                    self.draw_mark(area, frame, &Mark::Vertical { ink: Ink::Grid, x: *value })?;
                 }
             }
             Mark::Horizontal { ink, y } => {

@@ -2,13 +2,13 @@
 
 use super::{CURVE_POINTS, curve};
 use crate::error::ReportError;
-use crate::figure::{Anchor, Axis, Ink, Mark, Plot, Reading, Readings, corners, finite_runs, span, thin};
+use crate::figure::{Anchor, Axis, Ink, Mark, Plot, Reading, Readings, band_opacity, corners, finite_runs, span, thin};
 
 /// Room above and below the outermost limit, as a part of it.
 const BEYOND_LIMIT: f64 = 0.15;
 
 /// Points of each side of a band.
-const BAND_POINTS: usize = 100;
+const BAND_POINTS: usize = 200;
 
 /// Moments of a panel that are named.
 const NAMED_MOMENTS: usize = 4;
@@ -139,42 +139,50 @@ impl OverTime<'_> {
 
     fn marks(&self, y: &Axis, labelled: bool, count: usize) -> Vec<Mark> {
         let ((first, last), (lowest, highest)) = (self.times(), y.range());
-        let mut marks = Vec::new();
+        let (mut marks, mut words) = (Vec::new(), Vec::new());
         for (name, value) in self.limits.iter().filter(|(_, value)| (lowest..=highest).contains(value)) {
             marks.push(Mark::Horizontal { ink: Ink::Goal, y: *value });
-            if labelled || *value > 0.0 {
-                marks.push(above((*name).to_owned(), (first, *value), (3.0, -7.0)));
-            }
+            words.push(above((*name).to_owned(), (first, *value), (3.0, if *value < 0.0 { 8.0 } else { -7.0 })));
         }
         for (name, time_s) in self.moments.iter().filter(|(_, time_s)| (first..=last).contains(time_s)) {
             marks.push(Mark::Vertical { ink: Ink::Goal, x: *time_s });
             if self.moments.len() <= NAMED_MOMENTS {
-                marks.push(above((*name).to_owned(), (*time_s, highest), (4.0, 6.0)));
+                words.push(above((*name).to_owned(), (*time_s, highest), (4.0, 6.0)));
             }
         }
+        let opacity = band_opacity(self.curves.iter().filter(|curve| curve.band.is_some()).count());
         marks.extend(self.curves.iter().filter_map(|curve| {
             let (lower, upper) = curve.band?;
             let stride = curve.time_s.len().div_ceil(BAND_POINTS).max(1);
             let ends = lower.iter().copied().zip(upper.iter().copied());
             let points = curve.time_s.iter().copied().zip(ends).map(|(time, (lower, upper))| (time, lower, upper));
-            Some(Mark::Band { ink: curve.ink, points: points.step_by(stride).collect() })
+            Some(Mark::Band { ink: curve.ink, opacity, points: points.step_by(stride).collect() })
         }));
         if let Some((times, values)) = self.goal {
             marks.push(Mark::Line { ink: Ink::Goal, width: 1.3, points: corners(&curve(times, values)) });
         }
-        for one in &self.curves {
+        // The restless ones first, so that they do not hide the smooth ones.
+        let mut by_unrest: Vec<&Curve> = self.curves.iter().collect();
+        by_unrest.sort_by(|a, b| unrest(b.value).total_cmp(&unrest(a.value)));
+        for one in by_unrest {
             let points = thin(&curve(one.time_s, one.value), count);
             if let Some((_, y)) = finite_runs(&points).last().and_then(<[_]>::last).filter(|_| labelled) {
                 marks.push(Mark::EndLabel { ink: one.ink, text: one.name.to_owned(), y: *y });
             }
             marks.push(Mark::Line { ink: one.ink, width: 1.6, points });
         }
+        marks.extend(words);
         marks
     }
 }
 
 fn above(text: String, at: (f64, f64), shift: (f64, f64)) -> Mark {
     Mark::Label { ink: Ink::Axis, text, at, shift, anchor: Anchor::Start }
+}
+
+/// The way that a curve goes up and down in all.
+fn unrest(values: &[f64]) -> f64 {
+    values.windows(2).map(|pair| (pair[1] - pair[0]).abs()).filter(|step| step.is_finite()).sum()
 }
 
 /// The range, widened about its middle to at least `size`.
