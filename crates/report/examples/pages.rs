@@ -6,10 +6,12 @@ use std::error::Error;
 use std::path::PathBuf;
 use std::{env, fs};
 
-use certune_report::{CommandLine, FrontGoal, FrontPoint, FrontReport, Learnt, Verdict, front_report, tuning_report};
+use certune_report::{
+    CommandLine, FrontGoal, FrontPoint, FrontReport, Learnt, Verdict, comparison_report, front_report, tuning_report,
+};
 use serde::Serialize;
 
-#[path = "../tests/synthetic/mod.rs"]
+#[path = "../tests/pages/synthetic/mod.rs"]
 mod synthetic;
 
 /// A page, and the ids of the sections that it must show.
@@ -35,6 +37,7 @@ const REPORT: &[&str] = &[
     "method",
 ];
 const FRONT: &[&str] = &["front", "points", "pick", "method"];
+const COMPARISON: &[&str] = &["answer", "controllers", "statements", "findings", "replay", "repeat", "method"];
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = PathBuf::from(env::args_os().nth(1).ok_or("expected the folder to write the pages into")?);
@@ -43,6 +46,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         Page { file: "report-refused.html", sections: REPORT, html: refused()? },
         Page { file: "report-empty.html", sections: REPORT, html: empty()? },
         Page { file: "front.html", sections: FRONT, html: front()? },
+        Page {
+            file: "compare.html",
+            sections: COMPARISON,
+            html: comparison_report(&synthetic::comparison::comparison())?,
+        },
     ];
     fs::create_dir_all(&folder)?;
     for page in &pages {

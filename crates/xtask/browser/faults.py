@@ -1,6 +1,7 @@
 """Pages with one fault each, and the beginning of the words with which it must be found; None for a page that has none."""
 
 FIGURE = '<svg viewBox="0 0 10 10" role="img" aria-label="A dot"><circle id="dot" cx="5" cy="5" r="2"/></svg>'
+KEY = '<svg viewBox="0 0 9 1" aria-hidden="true"><circle r="1"/></svg>'
 SLIDER = '<label>Time <input type="range" min="0" max="9" value="5"></label>'
 MOVES = '<script>document.querySelector("input").oninput = e => dot.setAttribute("cx", e.target.value);</script>'
 
@@ -13,7 +14,7 @@ def page(body="", head="", section="main"):
 
 
 FAULTS = [
-    (None, page(f"<h2>Figure</h2><figure>{FIGURE}{SLIDER}</figure>{MOVES}")),
+    (None, page(f"<h2>Figure</h2><figure>{KEY}{FIGURE}{SLIDER}</figure>{MOVES}")),
     ("console: warning", page("<script>console.warn('a')</script>")),
     ("script", page("<script>throw new Error('a')</script>")),
     ("network", page('<img src="missing.png" alt="">')),
