@@ -9,11 +9,7 @@ use certune::closed_loop::{Gains, GainsFile, NoiseStream, Plant, PlantSetting, S
 use certune::control::aic::{Aic, AicParams};
 use certune::dynamics::Robot;
 
-/// Runs the story.
-///
-/// # Errors
-/// When a shipped file is broken, or is not for this arm.
-pub fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn Error>> {
     let robot = Robot::panda();
 
     // What to do, and the gains to do it with: the files that the command line ships.

@@ -10,11 +10,7 @@ use certune::dynamics::Robot;
 use certune::verify::{ClaimKind, Grade, Rejection, Verdict, verify};
 use certune::{ArmCertifier, certificate_text, family_of};
 
-/// Runs the story.
-///
-/// # Errors
-/// When a shipped file is broken, or the certificate cannot be read back.
-pub fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn Error>> {
     // The family: the plants that the scenario's box declares, any configuration.
     let file = Path::new("tuning/scenarios/pick-and-place.toml");
     let scenario = Scenario::parse(file, include_str!("../tuning/scenarios/pick-and-place.toml"))?;

@@ -1,4 +1,4 @@
-//! The house's rules that no compiler checks: who may import whom, and that every claim is complete.
+//! The house's rules that no compiler checks: who may import whom, and that every claim and every story is complete.
 
 use std::fs;
 use std::path::Path;
@@ -47,7 +47,8 @@ pub fn check(root: &Path) -> Result<(), String> {
             }
         }
     }
-    complete_claims(root)
+    complete_claims(root)?;
+    complete_stories(root)
 }
 
 /// Names under `[dependencies]`, and no other table.
@@ -109,6 +110,45 @@ fn claims_match(claims: &[String], mut tests: Vec<String>, certificates: &[Strin
     Ok(())
 }
 
+/// The longest story, lines.
+const STORY_LINES: usize = 80;
+
+/// Every story is short, numbered without a gap, in the table of `examples/src/lib.rs`, and built as an example unless it is no Rust.
+fn complete_stories(root: &Path) -> Result<(), String> {
+    let folder = root.join("examples");
+    let read = |file: &Path| fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()));
+    let (table, manifest) = (read(&folder.join("src/lib.rs"))?, read(&folder.join("Cargo.toml"))?);
+    let entries = fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let mut names: Vec<String> = entries
+        .filter_map(Result::ok)
+        .filter_map(|entry| entry.file_name().into_string().ok())
+        .filter(|name| name.starts_with(|first: char| first.is_ascii_digit()))
+        .collect();
+    names.sort();
+    for (number, name) in (1..).zip(&names) {
+        let lines = read(&folder.join(name))?.lines().count();
+        story_is_kept(number, name, lines, &table, &manifest)?;
+    }
+    Ok(())
+}
+
+fn story_is_kept(number: usize, name: &str, lines: usize, table: &str, manifest: &str) -> Result<(), String> {
+    if !name.starts_with(&format!("{number:02}_")) {
+        return Err(format!("examples/{name}: story {number:02} is missing, or there are two"));
+    }
+    if lines >= STORY_LINES {
+        return Err(format!("examples/{name} has {lines} lines, a story has less than {STORY_LINES}"));
+    }
+    let rust = name.strip_suffix(".rs");
+    if !table.contains(&format!("| `{}` |", rust.unwrap_or(name))) {
+        return Err(format!("examples/src/lib.rs does not list {name}"));
+    }
+    if rust.is_some() && !manifest.contains(&format!("path = \"{name}\"\ntest = true\nharness = false")) {
+        return Err(format!("examples/Cargo.toml does not run {name} as a test"));
+    }
+    Ok(())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -133,5 +173,15 @@ mod tests {
         assert!(check(&["a", "b"], &["a", "b"], &["a", "b", "c--more"]).is_err());
         assert!(check(&["a", "b"], &["a", "b"], &["a", "a--unlisted", "b"]).is_err());
         assert!(check(&[], &[], &[]).is_err());
+    }
+
+    #[test]
+    fn a_story_that_is_long_unlisted_or_never_run_is_noticed() {
+        let table = "| `01_a` | .. |\n| `02_b.py` | .. |";
+        let manifest = "path = \"01_a.rs\"\ntest = true\nharness = false\n";
+        let check = |number, name, lines| story_is_kept(number, name, lines, table, manifest).is_ok();
+        assert!(check(1, "01_a.rs", 79) && check(2, "02_b.py", 79));
+        assert!(!check(1, "01_a.rs", 80) && !check(2, "01_a.rs", 9) && !check(1, "01_c.rs", 9));
+        assert!(story_is_kept(1, "01_a.rs", 9, table, "path = \"01_a.rs\"").is_err());
     }
 }

@@ -3,6 +3,7 @@
 //! | command | what it does |
 //! |---|---|
 //! | `cargo xtask ci` | every check, in the order in which a failure is cheapest to learn |
+//! | `cargo xtask browser` | opens every kind of report in headless Chromium and tests it; pictures and prints in `target/browser` |
 //! | `cargo xtask golden` | writes the golden data again from Pinocchio (needs `pip install pin example-robot-data`) |
 //! | `cargo xtask peers` | sets up Pinocchio, MuJoCo and cvxpy from PyPI, and measures them and ours in turn: tables |
 //! | `cargo xtask peers tuners` | our search beside pycma, Optuna, SciPy and Nevergrad on a cheap objective: a table |
@@ -11,8 +12,10 @@
 //! | `cargo xtask claims` | writes the certificates in `proofs/certificates/` again, and the list of them in `proofs/README.md` |
 #![forbid(unsafe_code)]
 
+mod browser;
 mod house;
 mod peers;
+mod venv;
 
 use std::env;
 use std::path::{Path, PathBuf};
@@ -25,13 +28,14 @@ fn main() -> ExitCode {
     let words: Vec<String> = env::args().skip(1).collect();
     let outcome = match words.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         ["ci"] => ci(),
+        ["browser"] => browser::browser(),
         ["golden"] => golden(),
         ["claims"] => claims(),
         ["peers"] => peers::peers(),
         ["peers", "tuners"] => peers::compare("tuners.py"),
         ["peers", "panda"] => peers::compare("panda_tuners.py"),
         ["peers", "search"] => peers::search(),
-        _ => Err("usage: cargo xtask ci | golden | claims | peers [tuners | panda | search]".to_owned()),
+        _ => Err("usage: cargo xtask ci | browser | golden | claims | peers [tuners | panda | search]".to_owned()),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -73,6 +77,7 @@ fn ci() -> Outcome {
     // `--all-targets` leaves documentation tests out; benches are built and run once each as tests.
     run("tests and benches", cargo(&["test", "--release", "--workspace", "--all-targets"]))?;
     run("documentation tests", cargo(&["test", "--release", "--workspace", "--doc"]))?;
+    browser::browser()?;
     println!("\nall checks passed in {:.0} s", start.elapsed().as_secs_f64());
     Ok(())
 }

@@ -9,4 +9,5 @@ mod common;
 mod evaluate;
 mod front;
 mod resume;
+mod story;
 mod tune;

@@ -10,7 +10,6 @@
 mod lyapunov;
 mod search;
 mod tuners;
-mod venv;
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -20,7 +19,7 @@ use std::process::Command;
 pub use search::search;
 pub use tuners::compare;
 
-use crate::{Outcome, cargo, root, run};
+use crate::{Outcome, cargo, root, run, venv};
 
 /// Rounds of ours and theirs in turn; odd, so that the median is one of them.
 const ROUNDS: usize = 9;

@@ -8,8 +8,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use super::venv::python;
 use super::{bench, folder, said};
+use crate::venv::python;
 use crate::{Outcome, root, run};
 
 const PACKAGES: [&str; 2] = ["cma==4.5.0", "numpy==2.4.6"];

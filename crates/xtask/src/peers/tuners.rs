@@ -9,8 +9,8 @@
 
 use std::process::Command;
 
-use super::venv::python;
 use super::{built, folder};
+use crate::venv::python;
 use crate::{Outcome, root, run};
 
 const PACKAGES: [&str; 7] = [

@@ -1,6 +1,6 @@
 //! Better gains than the published ones, in seconds, and certified: search, certify, judge.
 //!
-//! `cargo run --release -p examples --example 03_tune`
+//! `cargo run --release -p examples --example 04_tune`
 
 use std::collections::BTreeMap;
 use std::error::Error;
@@ -14,11 +14,7 @@ use certune::tune::{
 use certune::verify::ClaimKind;
 use certune::{ArmCertifier, ArmGains, Request, family_of};
 
-/// Runs the story.
-///
-/// # Errors
-/// When a shipped file is broken, or nothing was certified.
-pub fn main() -> Result<(), Box<dyn Error>> {
+fn main() -> Result<(), Box<dyn Error>> {
     let robot = Robot::panda();
     let file = Path::new("tuning/scenarios/pick-and-place.toml");
     let scenario = Scenario::parse(file, include_str!("../tuning/scenarios/pick-and-place.toml"))?;

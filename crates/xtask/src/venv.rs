@@ -10,17 +10,17 @@ use crate::run;
 ///
 /// # Errors
 /// A step of the set-up that failed.
-pub(super) fn python(folder: &Path, name: &str, packages: &[&str]) -> Result<PathBuf, String> {
+pub fn python(folder: &Path, name: &str, packages: &[&str]) -> Result<PathBuf, String> {
     let venv = folder.join(name);
     let (python, ready, list) = (venv.join("bin/python"), venv.join("ready"), packages.join("\n"));
     // The mark names what is there: another list is fetched anew.
     if fs::read_to_string(&ready).ok().as_deref() != Some(&list) {
         let mut make = Command::new("python3");
         make.args(["-m", "venv"]).arg(&venv);
-        run("a Python environment for the peers", make)?;
+        run(&format!("a Python environment in {}", venv.display()), make)?;
         let mut install = Command::new(&python);
         install.args(["-m", "pip", "install", "--quiet", "--only-binary=:all:"]).args(packages);
-        run("the peers from PyPI", install)?;
+        run("its packages from PyPI", install)?;
         fs::write(&ready, list).map_err(|e| format!("{}: {e}", ready.display()))?;
     }
     Ok(python)
