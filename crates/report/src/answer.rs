@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use crate::claims::{self, Tone};
 use crate::format;
+use crate::quantile::quantile;
 use crate::record::{GainRow, PlantRow, RegionRecord, SegmentMetrics, SegmentRow, TuningReport, Verdict};
 
 /// The first screen.
@@ -241,14 +242,6 @@ pub(crate) fn summary(plants: &[PlantRow]) -> Vec<SummaryRow> {
         .collect()
 }
 
-/// The smallest cost that the given part of the plants does not exceed; a diverged run exceeds every cost.
-fn quantile(costs: &[Option<f64>], part: f64) -> Option<f64> {
-    let mut sorted: Vec<f64> = costs.iter().map(|cost| cost.unwrap_or(f64::INFINITY)).collect();
-    sorted.sort_by(f64::total_cmp);
-    let rank = (part * sorted.len() as f64).ceil().max(1.0) as usize;
-    finite(sorted.get(rank - 1).copied())
-}
-
 fn slowest(rows: &[SegmentRow], of: fn(&SegmentRow) -> &SegmentMetrics) -> Option<f64> {
     let times: Option<Vec<f64>> = rows.iter().map(|row| finite(of(row).settling_time_s)).collect();
     times?.into_iter().max_by(f64::total_cmp)
@@ -266,15 +259,6 @@ fn finite(value: Option<f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_diverged_plant_is_worse_than_every_cost() {
-        let costs = [Some(3.0), None, Some(1.0), Some(2.0)];
-        assert_eq!(quantile(&costs, 0.0), Some(1.0));
-        assert_eq!(quantile(&costs, 0.5), Some(2.0));
-        assert_eq!(quantile(&costs, 1.0), None);
-        assert_eq!(quantile(&[], 0.5), None);
-    }
 
     #[test]
     fn the_headline_never_calls_a_worse_result_better() {

@@ -67,6 +67,8 @@ fn bands(band: &Bands) -> Result<(), ReportError> {
     length("held_out.bands.error_p95_rad", samples, band.error_p95_rad.len())
 }
 
-fn length(series: &'static str, expected: usize, found: usize) -> Result<(), ReportError> {
+/// # Errors
+/// [`ReportError::Length`].
+pub(crate) fn length(series: &'static str, expected: usize, found: usize) -> Result<(), ReportError> {
     if expected == found { Ok(()) } else { Err(ReportError::Length { series, expected, found }) }
 }

@@ -1,16 +1,13 @@
 //! The page of a front: what two or three goals cost each other.
 
-use minijinja::Value;
-use minijinja::value::Serde;
 use serde::{Deserialize, Serialize};
 
 use crate::error::ReportError;
 use crate::figure::{Anchor, Axis, Ink, Mark, Plot, span};
-use crate::page::environment;
+use crate::page::html;
 use crate::record::CommandLine;
 
 const TEMPLATE: &str = include_str!("templates/front.html");
-const STYLE: &str = include_str!("templates/style.css");
 
 /// Nominal size of a figure.
 const SIZE: (f64, f64) = (400.0, 330.0);
@@ -60,7 +57,6 @@ pub struct FrontReport {
 
 #[derive(Serialize)]
 struct Page<'a> {
-    style: &'static str,
     headline: String,
     figures: Vec<String>,
     record: &'a FrontReport,
@@ -80,15 +76,11 @@ pub fn front_report(record: &FrontReport) -> Result<String, ReportError> {
     let pairs = (0..expected).flat_map(|first| (first + 1..expected).map(move |second| (first, second)));
     let names: Vec<&str> = record.goals.iter().map(|goal| goal.name.as_str()).collect();
     let page = Page {
-        style: STYLE,
         headline: format!("{} certified compromises between {}", record.points.len(), listed(&names)),
         figures: pairs.map(|pair| plot(record, pair).svg()).collect::<Result<_, _>>()?,
         record,
     };
-    let mut environment = environment()?;
-    environment.add_template("front.html", TEMPLATE)?;
-    let html = environment.get_template("front.html")?.render(Value::from(Serde(&page)))?;
-    Ok(html.trim_start().to_owned())
+    html(TEMPLATE, &page)
 }
 
 /// `a, b and c`.

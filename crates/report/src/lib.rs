@@ -24,6 +24,7 @@
 mod answer;
 mod check;
 mod claims;
+mod comparison;
 mod error;
 mod figure;
 mod format;
@@ -31,8 +32,10 @@ mod front;
 mod learnt;
 mod page;
 mod panels;
+mod quantile;
 mod record;
 
+pub use comparison::comparison_report;
 pub use error::ReportError;
 pub use front::{FrontGoal, FrontPoint, FrontReport, front_report};
 pub use record::*;

@@ -13,13 +13,16 @@ use crate::learnt::{self, LearntView};
 use crate::panels::Panels;
 use crate::record::{Asked, CommandLine, Evaluation, GainRow, Pair, PlantRow, SegmentRow, TuningReport, Version};
 
+/// The page that all others fill in, and what several of them use.
+const BASE: &str = include_str!("templates/base.html");
+const MACROS: &str = include_str!("templates/macros.html");
 const TEMPLATE: &str = include_str!("templates/report.html");
 const STYLE: &str = include_str!("templates/style.css");
+const READINGS: &str = include_str!("templates/readings.js");
 
 /// What the template sees; a name it does not find here is an error, not a blank.
 #[derive(Serialize)]
 struct Page<'a> {
-    style: &'static str,
     panels: Panels,
     asked: &'a Asked,
     answer: Answer,
@@ -61,11 +64,24 @@ struct OutcomeCount<'a> {
     count: usize,
 }
 
-/// What every page's template is rendered with.
+/// A complete page: the template, which fills in `base.html`, with what it shows.
 ///
 /// # Errors
 /// [`ReportError::Template`].
-pub(crate) fn environment() -> Result<Environment<'static>, ReportError> {
+pub(crate) fn html(template: &'static str, page: &impl Serialize) -> Result<String, ReportError> {
+    let mut environment = environment()?;
+    environment.add_template("base.html", BASE)?;
+    environment.add_template("macros.html", MACROS)?;
+    environment.add_template("page.html", template)?;
+    environment.add_global("style", STYLE);
+    environment.add_global("script", READINGS);
+    let html = environment.get_template("page.html")?.render(Value::from(Serde(page)))?;
+    // The macros at the head of the template leave blank lines.
+    Ok(html.trim_start().to_owned())
+}
+
+/// What every page's template is rendered with.
+fn environment() -> Result<Environment<'static>, ReportError> {
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
@@ -86,10 +102,7 @@ pub(crate) fn environment() -> Result<Environment<'static>, ReportError> {
 /// # Errors
 /// [`ReportError::Draw`] and [`ReportError::Template`].
 pub(crate) fn render(record: &TuningReport) -> Result<String, ReportError> {
-    let mut environment = environment()?;
-    environment.add_template("report.html", TEMPLATE)?;
     let page = Page {
-        style: STYLE,
         panels: Panels::new(record)?,
         asked: &record.asked,
         answer: answer::answer(record),
@@ -114,9 +127,7 @@ pub(crate) fn render(record: &TuningReport) -> Result<String, ReportError> {
         method: &record.method,
         versions: &record.versions,
     };
-    let html = environment.get_template("report.html")?.render(Value::from(Serde(&page)))?;
-    // The macros at the head of the template leave blank lines.
-    Ok(html.trim_start().to_owned())
+    html(TEMPLATE, &page)
 }
 
 fn gain(row: &GainRow) -> GainView<'_> {

@@ -8,8 +8,10 @@
 
 use serde::{Deserialize, Serialize};
 
+mod comparison;
 mod learnt;
 
+pub use comparison::*;
 pub use learnt::*;
 
 /// One tuning run: what was asked, what came out, and the evidence.

@@ -2,6 +2,9 @@
 
 use crate::format;
 
+/// Decades of a logarithmic axis: below them lies nothing that a reader could use.
+const MOST_DECADES: i32 = 12;
+
 /// One axis of a plot.
 #[derive(Clone, Debug)]
 pub(crate) struct Axis {
@@ -40,10 +43,12 @@ impl Axis {
         Self::linear(caption, (lower - margin, upper + margin), count)
     }
 
-    /// Equal ratios; both ends must be positive, otherwise the lower end is put six decades below the upper.
+    /// Equal ratios; both ends must be positive, otherwise the lower end is put six decades below the upper. More than
+    /// [`MOST_DECADES`] are not shown.
     pub(crate) fn log(caption: impl Into<String>, (lower, upper): (f64, f64)) -> Self {
-        let upper = if upper > 0.0 { upper } else { 1.0 };
+        let upper = if upper > 1e-290 { upper.min(1e290) } else { 1.0 };
         let lower = if lower > 0.0 && lower < upper { lower } else { upper * 1e-6 };
+        let lower = lower.max(upper * 10_f64.powi(-MOST_DECADES));
         let margin = (upper / lower).powf(0.05).max(1.1);
         Self::log_within(caption, (lower / margin, upper * margin))
     }
@@ -81,6 +86,12 @@ impl Axis {
         let ticks: Vec<_> = names.into_iter().enumerate().map(|(row, name)| (row_at(row), name)).collect();
         let lower = row_at(ticks.len().max(1)) + 0.5;
         Self { caption: String::new(), scale: Scale::Linear, lower, upper: 0.5, ticks }
+    }
+
+    /// [`Axis::rows`] that say themselves what they are.
+    pub(crate) fn strips(count: usize) -> Self {
+        let named = Self::rows((0..count).map(|_| String::new()));
+        Self { ticks: Vec::new(), ..named }
     }
 
     /// The range.

@@ -23,9 +23,29 @@ pub(crate) enum Ink {
     Outside = 8,
     /// One candidate among many.
     Candidate = 9,
+    /// AIC with published gains, in a comparison.
+    AicPublished = 0x10,
+    /// AIC with tuned gains, in a comparison.
+    AicTuned = 0x11,
+    /// A further AIC, in a comparison.
+    AicOther = 0x12,
+    /// MRAC as its released code has it.
+    MracCode = 0x13,
+    /// MRAC as the equations of its paper have it.
+    MracPaper = 0x14,
+    /// MRAC with tuned gains.
+    MracTuned = 0x15,
+    /// A controller of another kind.
+    Baseline = 0x16,
 }
 
 impl Ink {
+    /// The sentinel as an attribute of a drawing holds it.
+    pub(crate) fn sentinel(self) -> String {
+        let level = self as u8;
+        format!("#{level:02X}{level:02X}{level:02X}")
+    }
+
     /// The sentinel.
     pub(super) const fn color(self) -> RGBColor {
         let level = self as u8;

@@ -9,12 +9,19 @@
 mod axis;
 mod ink;
 mod plot;
+mod readings;
 mod thin;
 
 pub(crate) use axis::{Axis, row_at};
 pub(crate) use ink::Ink;
-pub(crate) use plot::{Anchor, Mark, Plot};
+pub(crate) use plot::{Anchor, Geometry, Mark, Plot};
+pub(crate) use readings::{Reading, Readings, embedded};
 pub(crate) use thin::{corners, finite_runs, on_grid, thin};
+
+/// How strongly one of several bands over each other is drawn: the more there are, the paler.
+pub(crate) fn band_opacity(bands: usize) -> f64 {
+    0.35 / (bands.max(1) as f64 + 0.6)
+}
 
 /// Smallest and largest finite value.
 pub(crate) fn span(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {

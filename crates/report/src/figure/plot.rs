@@ -5,9 +5,11 @@ use plotters::element::{Circle, PathElement, Polygon, Rectangle, Text};
 use plotters::prelude::{Color, DrawingArea, IntoDrawingArea, SVGBackend, ShapeStyle};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{FontStyle, IntoFont, TextStyle};
+use serde::Serialize;
 
 use super::Axis;
 use super::ink::Ink;
+use super::readings::Readings;
 use super::thin::{Point, finite_runs};
 use crate::error::ReportError;
 
@@ -50,7 +52,7 @@ pub(crate) enum Mark {
     /// A curve.
     Line { ink: Ink, width: f64, points: Vec<Point> },
     /// The area between two curves: `(x, lower, upper)`.
-    Band { ink: Ink, points: Vec<(f64, f64, f64)> },
+    Band { ink: Ink, opacity: f64, points: Vec<(f64, f64, f64)> },
     /// Points.
     Dots { ink: Ink, radius: f64, opacity: f64, points: Vec<Point> },
     /// A rectangle between two corners.
@@ -59,6 +61,8 @@ pub(crate) enum Mark {
     Bar { ink: Ink, opacity: f64, height: f64, from: Point, to_x: f64 },
     /// A vertical line.
     Vertical { ink: Ink, x: f64 },
+    /// A vertical line at each tick.
+    Ticks,
     /// A horizontal line.
     Horizontal { ink: Ink, y: f64 },
     /// Words at a point, moved by nominal pixels.
@@ -73,6 +77,17 @@ pub(crate) enum Anchor {
     Start,
     Middle,
     End,
+}
+
+/// Where values lie in a drawing: for scripts that read or move it.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct Geometry {
+    /// Left, right, top and bottom of the axes, in units of the view box.
+    frame: [f64; 4],
+    /// Range of the horizontal axis.
+    x: (f64, f64),
+    /// Range of the vertical axis.
+    y: (f64, f64),
 }
 
 /// The rectangle of the axes, in nominal pixels.
@@ -104,8 +119,40 @@ impl Plot {
         let (width, height) = (units(self.size.0), units(self.size.1));
         let (title, description) = (escaped(&self.title), escaped(&self.description));
         Ok(format!(
-            "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}. {description}\"><title>{title}</title>{body}"
+            "<svg viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{title}\"><title>{title}</title><desc>{description}</desc>{body}"
         ))
+    }
+
+    /// [`Plot::svg`], followed by the values that a script reads off it.
+    ///
+    /// # Errors
+    /// As [`Plot::svg`], and [`ReportError::Json`].
+    pub(crate) fn svg_with(&self, readings: &Readings) -> Result<String, ReportError> {
+        let data = readings.json(self.geometry())?;
+        Ok(format!("{}<script type=\"application/json\" class=\"readings\">{data}</script>", self.svg()?))
+    }
+
+    /// Where values lie in the drawing.
+    pub(crate) fn geometry(&self) -> Geometry {
+        let Frame { left, right, top, bottom } = self.frame();
+        Geometry {
+            frame: [left, right, top, bottom].map(|length| f64::from(units(length))),
+            x: self.x.range(),
+            y: self.y.range(),
+        }
+    }
+
+    /// Where a point lies in the drawing, in units of the view box; `None` for a NaN.
+    pub(crate) fn place(&self, point: Point) -> Option<(i32, i32)> {
+        self.at(&self.frame(), point).map(pixel)
+    }
+
+    /// Changes the height so that a unit of both axes has the same length.
+    pub(crate) fn true_to_scale(mut self) -> Self {
+        let Frame { left, right, .. } = self.frame();
+        let ((x0, x1), (y0, y1)) = (self.x.range(), self.y.range());
+        self.size.1 = TOP + BOTTOM + (right - left) * (y1 - y0) / (x1 - x0);
+        self
     }
 
     fn draw(&self, buffer: &mut String) -> Drawn {
@@ -163,14 +210,14 @@ impl Plot {
                     line(area, *ink, *width, &place(run))?;
                 }
             }
-            Mark::Band { ink, points } => {
+            Mark::Band { ink, opacity, points } => {
                 let whole = |p: &&(f64, f64, f64)| p.0.is_finite() && p.1.is_finite() && p.2.is_finite();
                 let lower = points.iter().filter(whole).map(|(x, lower, _)| (*x, *lower));
                 let upper = points.iter().rev().filter(whole).map(|(x, _, upper)| (*x, *upper));
                 let outline = place(&lower.chain(upper).collect::<Vec<_>>());
                 if outline.len() > 2 {
                     let outline: Vec<_> = outline.into_iter().map(pixel).collect();
-                    area.draw(&Polygon::new(outline, ink.color().mix(0.22)))?;
+                    area.draw(&Polygon::new(outline, ink.color().mix(*opacity)))?;
                 }
             }
             Mark::Dots { ink, radius, opacity, points } => {
@@ -192,6 +239,11 @@ impl Plot {
             Mark::Vertical { ink, x } => {
                 if let Some((x, _)) = self.at(frame, (*x, self.y.range().0)) {
                     line(area, *ink, 1.2, &[(x, frame.top), (x, frame.bottom)])?;
+                }
+            }
+            Mark::Ticks => {
+                for (value, _) in self.x.ticks() {
+                    self.draw_mark(area, frame, &Mark::Vertical { ink: Ink::Grid, x: *value })?;
                 }
             }
             Mark::Horizontal { ink, y } => {

@@ -3,7 +3,7 @@
 use super::response::word;
 use super::{CURVE_POINTS, HALF, curve};
 use crate::error::ReportError;
-use crate::figure::{Axis, Ink, Mark, Plot, finite_runs, span, thin};
+use crate::figure::{Axis, Ink, Mark, Plot, band_opacity, finite_runs, span, thin};
 use crate::format;
 use crate::record::{HeldOut, TuningReport};
 
@@ -23,7 +23,7 @@ pub(super) fn bands(held_out: &HeldOut) -> Result<Option<String>, ReportError> {
             .step_by(stride)
             .map(|k| (band.time_s[k], band.error_p05_rad[k], band.error_p95_rad[k]))
             .collect();
-        marks.push(Mark::Band { ink, points });
+        marks.push(Mark::Band { ink, opacity: band_opacity(2), points });
     }
     for (ink, band) in both {
         let points = thin(&curve(&band.time_s, &band.error_p50_rad), CURVE_POINTS);

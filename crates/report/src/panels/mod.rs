@@ -6,6 +6,7 @@
 mod certificate;
 mod held_out;
 mod learnt;
+pub(crate) mod over_time;
 mod response;
 mod search;
 mod sensitivity;
@@ -13,16 +14,17 @@ mod sensitivity;
 use serde::Serialize;
 
 use crate::error::ReportError;
+use crate::figure::{Plot, Readings};
 use crate::record::TuningReport;
 
 /// Nominal sizes: three, two, or one figure a row; and the one of a phone.
-const THIRD: (f64, f64) = (336.0, 190.0);
-const HALF: (f64, f64) = (400.0, 270.0);
-const WIDE: (f64, f64) = (840.0, 290.0);
-const PHONE: (f64, f64) = (360.0, 270.0);
+pub(crate) const THIRD: (f64, f64) = (336.0, 190.0);
+pub(crate) const HALF: (f64, f64) = (400.0, 270.0);
+pub(crate) const WIDE: (f64, f64) = (840.0, 290.0);
+pub(crate) const PHONE: (f64, f64) = (360.0, 270.0);
 
 /// Points a curve keeps.
-const CURVE_POINTS: usize = 320;
+pub(crate) const CURVE_POINTS: usize = 320;
 
 /// A figure in both widths.
 #[derive(Debug, Serialize)]
@@ -34,8 +36,13 @@ pub(crate) struct TwoWidths {
 }
 
 impl TwoWidths {
-    fn new(plot: impl Fn((f64, f64)) -> crate::figure::Plot) -> Result<Self, ReportError> {
+    pub(crate) fn new(plot: impl Fn((f64, f64)) -> Plot) -> Result<Self, ReportError> {
         Ok(Self { wide: plot(WIDE).svg()?, narrow: plot(PHONE).svg()? })
+    }
+
+    /// [`TwoWidths::new`] with values to read off.
+    pub(crate) fn with(plot: impl Fn((f64, f64)) -> Plot, readings: &Readings) -> Result<Self, ReportError> {
+        Ok(Self { wide: plot(WIDE).svg_with(readings)?, narrow: plot(PHONE).svg_with(readings)? })
     }
 }
 
@@ -89,6 +96,6 @@ impl Panels {
 }
 
 /// Points of a curve from two series.
-fn curve(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
+pub(crate) fn curve(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
     x.iter().copied().zip(y.iter().copied()).collect()
 }

@@ -1,6 +1,8 @@
 //! A record with plausible signals: an arm of seven joints that steps between three goals, each joint a damped
 //! second-order system; faster with the tuned gains.
 
+pub mod comparison;
+
 use certune_report::*;
 
 const GOALS: [[f64; 7]; 5] = [A, B, C, B, A];
