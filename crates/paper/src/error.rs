@@ -18,6 +18,16 @@ pub enum CompareError {
         /// Its joints.
         joints: usize,
     },
+    /// Seven joints, but not the Panda's.
+    #[error(
+        "the joint before {link} of robot {robot} is not where the Panda has it: the paper's goals and gains are for no other arm"
+    )]
+    Geometry {
+        /// The robot's name.
+        robot: String,
+        /// The link behind the joint.
+        link: String,
+    },
     /// A comparison needs arms.
     #[error("a comparison needs at least 1 arm, got 0")]
     NoArms,

@@ -95,6 +95,8 @@ pub(crate) const TORQUE_RATE_N_M_PER_S: f64 = 1000.0;
 pub(crate) const ROTOR_KG_M2: f64 = 0.1;
 /// Viscous friction of the robot in the experiments, N m s/rad.
 pub(crate) const FRICTION_N_M_S_PER_RAD: f64 = 1.0;
+/// Frames this close are the same: descriptions round, m and 1.
+const SAME_FRAME: f64 = 1e-6;
 /// The limit on every joint's torque in the paper, N m.
 const PAPER_LIMIT_N_M: f64 = 85.0;
 
@@ -123,11 +125,22 @@ pub mod names {
 }
 
 impl Inputs {
-    /// Checks what the experiments rest on.
-    pub(crate) fn check(&self) -> Result<(), CompareError> {
+    /// Checks what the experiments rest on, as [`compare`](crate::compare) does before it begins.
+    ///
+    /// # Errors
+    /// [`CompareError`] for an arm that is not the Panda, gains of the other controller, and scenarios without what their experiments need.
+    pub fn check(&self) -> Result<(), CompareError> {
         for robot in [&self.robot, &self.approximated] {
             if robot.joints() != JOINTS {
                 return Err(CompareError::Joints { robot: robot.name().to_owned(), joints: robot.joints() });
+            }
+        }
+        let pairs = self.robot.links().iter().zip(self.approximated.links());
+        for (link, panda) in pairs {
+            let apart = (link.frame.position() - panda.frame.position()).amax();
+            let turned = (link.frame.rotation_matrix() - panda.frame.rotation_matrix()).amax();
+            if !(apart <= SAME_FRAME && turned <= SAME_FRAME) {
+                return Err(CompareError::Geometry { robot: self.robot.name().to_owned(), link: link.name.clone() });
             }
         }
         if self.size.arms == 0 || self.size.grid_arms == 0 {

@@ -207,4 +207,10 @@ fn inputs_that_do_not_fit_are_refused() {
     let robot = Robot::new("six", Robot::panda().gravity_m_per_s2(), six).expect("an arm");
     let error = compare(&Inputs { robot, ..small() }, &|_| ()).expect_err("six joints");
     assert!(error.to_string().contains("robot six has 6 joints"), "{error}");
+    let mut links = Robot::panda().links().to_vec();
+    links[3].frame.xyz_m[0] += 0.01;
+    let robot = Robot::new("other", Robot::panda().gravity_m_per_s2(), links).expect("an arm");
+    assert!(
+        matches!(Inputs { robot, ..small() }.check(), Err(CompareError::Geometry { link, .. }) if link == "panda_link4")
+    );
 }

@@ -182,7 +182,7 @@ impl Ruling {
 }
 
 /// The command that repeats everything.
-pub(crate) const COMPARE: &str = "autotune compare --robot panda";
+pub const COMPARE: &str = "autotune compare --robot panda";
 
 /// The share of arms whose figure is there and passes.
 pub(crate) fn share(arms: &Arms, figure: &str, passes: impl Fn(f64) -> bool) -> Option<f64> {
