@@ -13,7 +13,8 @@ use clap::error::ErrorKind;
 use clap::{Args, CommandFactory, Parser, Subcommand, ValueEnum};
 
 use crate::commands::{
-    ask_tell, certify, constants, diff, evaluate, front, inspect, lists, report, resume, runs, simulate, tune, verify,
+    ask_tell, certify, compare, constants, diff, evaluate, front, inspect, lists, report, resume, runs, simulate, tune,
+    verify,
 };
 use crate::error::Error;
 use crate::interrupt;
@@ -82,6 +83,8 @@ pub enum Command {
     Constants(ConstantsArgs),
     /// Run a scenario and print its figures
     Simulate(SimulateArgs),
+    /// Run the experiments of the paper again, AIC and MRAC side by side, and judge its statements
+    Compare(CompareArgs),
     /// Print the arm's dynamics at one state
     Inspect(InspectArgs),
     /// Rebuild report.html from a run's folder
@@ -233,6 +236,27 @@ pub struct FrontArgs {
     #[arg(long, value_name = "T", value_parser = threads)]
     pub threads: Option<usize>,
     /// Folder for the results [default: runs/ROBOT-CONTROLLER-front-SEED]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    #[command(flatten)]
+    pub robot: RobotArgs,
+    /// Tuned gains of the AIC: a preset (see `autotune presets`) or a TOML file [default: searched]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub gains_aic: Option<String>,
+    /// Tuned gains of MRAC: a preset or a TOML file [default: searched]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub gains_mrac: Option<String>,
+    /// Seed of every random draw [default: 1]
+    #[arg(long, value_name = "S")]
+    pub seed: Option<u64>,
+    /// Threads; the result does not depend on it, but for the measured times [default: one per core]
+    #[arg(long, value_name = "T", value_parser = threads)]
+    pub threads: Option<usize>,
+    /// Folder for the results [default: runs/ROBOT-compare-SEED]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
 }
@@ -538,6 +562,7 @@ fn dispatch(cli: Cli) -> Result<Exit, Error> {
         (Some(Command::Verify(args)), _) => verify::run(&args, context),
         (Some(Command::Constants(args)), _) => constants::run(&args, context),
         (Some(Command::Simulate(args)), _) => simulate::run(&args, context),
+        (Some(Command::Compare(args)), _) => compare::run(&args, context),
         (Some(Command::Inspect(args)), _) => inspect::run(&args, context),
         (Some(Command::Report(args)), _) => report::run(&args, context),
         (Some(Command::Robots), _) => lists::robots(context),

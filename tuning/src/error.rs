@@ -10,6 +10,7 @@ use certune::dynamics::RobotError;
 use certune::report::ReportError;
 use certune::tune::{BatchError, Goal, SearchError, SpaceError, TuneError};
 use certune::verify::VerifyError;
+use certune_paper::CompareError;
 
 use crate::journal::JournalError;
 
@@ -96,6 +97,9 @@ pub enum Error {
     /// The search was refused.
     #[error(transparent)]
     Tune(#[from] TuneError),
+    /// No comparison can be made of this.
+    #[error(transparent)]
+    Compare(#[from] CompareError),
     /// The page could not be made.
     #[error("the report could not be made: {0}")]
     Report(#[from] ReportError),
@@ -207,6 +211,12 @@ impl Error {
             Self::OtherRobot { .. } | Self::RobotOfRun { .. } => {
                 Some("--robot with the URDF file of that run (and --tip, if it was named)".to_owned())
             }
+            Self::Compare(CompareError::Joints { .. } | CompareError::Geometry { .. }) => {
+                Some("--robot panda, panda-bare or panda-cuboid, or a URDF file of the Panda".to_owned())
+            }
+            Self::Compare(CompareError::Controller { expected, .. }) => {
+                Some(format!("gains of `{expected}`, see `autotune presets`"))
+            }
             Self::Journal(error) => error.advice(),
             Self::Threads { .. } => Some("a smaller --threads".to_owned()),
             Self::File(error) if matches!(*error.problem, certune::closed_loop::Problem::Unreadable { .. }) => None,
@@ -217,6 +227,7 @@ impl Error {
             | Self::Plant(_)
             | Self::Gains { .. }
             | Self::Stability(_)
+            | Self::Compare(_)
             | Self::Batch(_)
             | Self::Front(_)
             | Self::Tune(_)

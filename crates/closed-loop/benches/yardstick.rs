@@ -3,7 +3,7 @@
 //! | call | prints |
 //! |------|--------|
 //! | `yardstick WORK` | `WORK NS_PER_ITEM` |
-//! | `yardstick operations WORK` | `WORK OPERATIONS_PER_ITEM`, see [`certune_testkit::operations`] |
+//! | `yardstick operations WORK` | `WORK OPERATIONS_PER_ITEM`, see [`certune_linsys::operations`] |
 //! | `yardstick peak` | `peak OPERATIONS_PER_NS` of one core |
 //! | `yardstick model` | the arm for Pinocchio's program |
 //! | `yardstick mjcf` | the arm for MuJoCo |
@@ -25,8 +25,8 @@ use certune_control::{Controller, Measurement};
 use certune_dynamics::{
     Joints, Model, Robot, State, forward_dynamics, gravity_torque, inverse_dynamics, linearise, mass_matrix,
 };
+use certune_linsys::{Counted, operations};
 use certune_simd::{InstructionSet, Kernel, Lanes};
-use certune_testkit::{Counted, operations};
 use proptest::strategy::{Strategy, ValueTree};
 use proptest::test_runner::TestRunner;
 use rand_chacha::ChaCha8Rng;
@@ -151,6 +151,7 @@ fn chain_ns<const N: usize>(coulomb: bool, seconds: f64) -> f64 {
         start: Joints::zeros(),
         segments: vec![certune_closed_loop::task::TaskSegment { goal: Joints::repeat(0.1), steps: 500 }],
         torque_limits: false,
+        torque_rate_limit_n_m_per_s: None,
         goal_limiter: None,
         integrator: Default::default(),
         noise: Default::default(),

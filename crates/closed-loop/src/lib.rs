@@ -8,6 +8,8 @@
 //! | [`task`] | a scenario bound to an arm |
 //! | [`plant_box`] | the family of plants a scenario declares, and seeded draws |
 //! | [`simulate`](mod@simulate) | the loop at 1 kHz, without a heap |
+//! | [`recorded`] | many runs side by side, each with its own recorder |
+//! | [`safety`] | when the arm's own protection would have stopped a run |
 //! | [`metrics`] | figures per goal and joint |
 //! | [`drift`] | how far the adaptive gains drift from goal to goal |
 //! | [`trajectory`] | a run kept for plots |
@@ -51,6 +53,8 @@ pub mod linear;
 pub mod metrics;
 pub mod parameters;
 pub mod plant_box;
+pub mod recorded;
+pub mod safety;
 pub mod scenario;
 pub mod simulate;
 pub mod task;
@@ -64,6 +68,8 @@ pub use linear::{linearise_aic, linearise_aic_sampled, linearise_mrac, linearise
 pub use metrics::{Metrics, Segment};
 pub use parameters::Parameters;
 pub use plant_box::{PlantBox, PlantError, PlantSetting};
+pub use recorded::simulate_many_recorded;
+pub use safety::{Guarded, SafetyLimits, SafetyMonitor, Violation};
 pub use scenario::Scenario;
 pub use simulate::{
     Bundle, MAX_DELAY_SAMPLES, NoiseStream, Plant, Progress, Recorder, Run, Sample, Simulation, simulate,

@@ -6,6 +6,7 @@
 //! description = "one line"
 //! step_s = 0.001
 //! torque_limits = true                  # default true
+//! torque_rate_limit_n_m_per_s = 1000    # optional: the motor follows the controller's torque no faster than this, gravity compensation apart
 //! goal_speed_rad_per_s = 0.3            # optional: goals move this fast (2-norm over the joints) instead of jumping
 //! start_rad = [0, 0.2, 0, -1, 0, 1.2, 0]
 //! [[segments]]                          # goals, one after the other; each jumps at its start, or starts to move
@@ -156,6 +157,9 @@ pub struct Scenario {
     /// Whether motor torques are limited to the robot's limits.
     #[serde(default = "yes")]
     pub torque_limits: bool,
+    /// The motor follows the controller's torque no faster than this, N m/s; at once unless given. What the arm adds against its own gravity is not limited.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub torque_rate_limit_n_m_per_s: Option<f64>,
     /// The controller's goal moves from one goal to the next at this speed, rad/s (2-norm over the joints); it jumps unless given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal_speed_rad_per_s: Option<f64>,
@@ -222,6 +226,7 @@ impl Scenario {
             start_rad: pose(0.0),
             segments: vec![goal(1.0), goal(-1.0), goal(0.0)],
             torque_limits: true,
+            torque_rate_limit_n_m_per_s: None,
             goal_speed_rad_per_s: None,
             integrator: Integrator::default(),
             noise: Noise::default(),
@@ -269,6 +274,9 @@ impl Scenario {
             if !(1.0..=MOST_STEPS).contains(&steps) {
                 return Err(KeyError::out_of_range(&key, segment.duration_s, "between one and 1e9 steps of `step_s`"));
             }
+        }
+        if let Some(rate) = self.torque_rate_limit_n_m_per_s {
+            positive("torque_rate_limit_n_m_per_s", rate)?;
         }
         self.goal_limiter()?;
         if self.integrator.substeps == 0 {
@@ -373,6 +381,7 @@ impl Scenario {
             start: joints("start_rad", &self.start_rad)?,
             segments,
             torque_limits: self.torque_limits,
+            torque_rate_limit_n_m_per_s: self.torque_rate_limit_n_m_per_s,
             goal_limiter: self.goal_limiter()?,
             integrator: self.integrator,
             noise: self.noise,
@@ -478,6 +487,10 @@ mod tests {
         for bad in ["0", "-0.1", "nan", "inf", "1e-322"] {
             let limited = format!("torque_limits = true\ngoal_speed_rad_per_s = {bad}");
             assert_eq!(edit("torque_limits = true", &limited), ("goal_speed_rad_per_s".to_owned(), 7), "{bad}");
+        }
+        for bad in ["0", "-1000", "nan", "inf"] {
+            let limited = format!("torque_limits = true\ntorque_rate_limit_n_m_per_s = {bad}");
+            assert_eq!(edit("torque_limits = true", &limited), ("torque_rate_limit_n_m_per_s".to_owned(), 7), "{bad}");
         }
         assert_eq!(edit("torque_limits = true", "goal_speed_rad_s = 1").0, "goal_speed_rad_s");
         let swap = FILES[3].1;

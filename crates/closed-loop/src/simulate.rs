@@ -7,7 +7,8 @@
 //! goal        r_k = the task's goal, or r_{k-1} moved towards it at the task's goal speed; r_{-1} is the start
 //! control     u_k = controller(y, r_k)
 //! delay       u   = u_{k-d}, zero before the run
-//! compensate  tau = u + g(q)                        if the arm compensates its gravity
+//! rate        c_k = c_{k-1} + clamp(u - c_{k-1}, rate h), c_{-1} = 0   if the task limits the torque's rate; else c_k = u
+//! compensate  tau = c + g(q)                        if the arm compensates its gravity
 //! limit       tau = clamp(tau, -limit, limit)       if the task asks for limits
 //! plant       ddq = M(q)⁻¹ (tau + pushes - C dq - g - friction(dq)),   dq += h ddq,   q += h dq
 //! ```
@@ -16,6 +17,7 @@
 //! |--------|------|---------|------|
 //! | tau    | [`Sample::tau`] | torque the motor gives, held over the sample | N m |
 //! | u      | [`Sample::u`] | torque the controller asks for, before delay | N m |
+//! | c      | [`Sample::command`] | what of it reaches the motor: delayed, its rate limited | N m |
 //! | d      | `delay_samples` | whole samples from command to torque | 1 |
 //!
 //! **Gravity compensation** is the arm's inner loop: g(q) of the plant's *true* model, its constant payload included, at the true position and
@@ -134,6 +136,8 @@ pub struct Sample<'a, const N: usize, S, T: Real = f64> {
     pub goal: Joints<N, T>,
     /// The torque the controller asks for, before delay, N m.
     pub u: Joints<N, T>,
+    /// What of the controller's torque reaches the motor: delayed and limited in its rate, before gravity compensation and the motor's limit, N m.
+    pub command: Joints<N, T>,
     /// The torque the motor gives during the sample, N m.
     pub tau: Joints<N, T>,
     /// The controller's state after its step.
@@ -217,6 +221,10 @@ pub struct Bundle<'a, const N: usize, C: Controller<N, T>, T: Lanes> {
     runge_kutta: [State<N, T>; 2],
     controller_state: C::State,
     commands: [Joints<N, T>; RING],
+    /// What reached the motors last; only kept where the torque's rate is limited.
+    command: Joints<N, T>,
+    /// The most that may change from one sample to the next, N m, where the tasks limit the torque's rate.
+    most_change: Option<T>,
     given: Joints<N, T>,
     /// The goals of the tasks, and those the controller was given last.
     ordered: Joints<N, T>,
@@ -274,7 +282,7 @@ fn pack_joints<const N: usize, T: Lanes>(of: impl Fn(usize) -> Joints<N>) -> Joi
 impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
     /// Runs about to begin: each arm rests at its task's start, the controller's beliefs are at the first measurement.
     ///
-    /// Sampling step, integrator and goal limiter are those of the first run's task, see [`Task::steps_alike`]. With fewer runs than lanes
+    /// Sampling step, integrator, goal limiter and torque-rate limit are those of the first run's task, see [`Task::steps_alike`]. With fewer runs than lanes
     /// the first one is repeated in the others, whose figures nobody asks for; more runs than lanes are left out, and no run at all is none to be had:
     /// `runs` must not be empty.
     pub fn side_by_side(runs: &[Run<'a, N>], controller: &'a C) -> Self {
@@ -330,6 +338,8 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
             nominal,
             controller_state: controller.start(&first),
             commands: [Joints::zeros(); RING],
+            command: Joints::zeros(),
+            most_change: task.torque_rate_limit_n_m_per_s.map(|rate| T::from_f64(rate * task.step_s)),
             given: Joints::zeros(),
             ordered: pack_joints(|lane| lanes[lane].goal()),
             goal: state.q,
@@ -371,6 +381,11 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
     #[inline]
     pub fn progress(&self) -> Progress {
         if self.running > 0 { Progress::Running } else { self.lanes[0].progress }
+    }
+
+    /// Whether the run in a lane goes on.
+    pub fn runs(&self, lane: usize) -> bool {
+        self.lanes[lane].runs()
     }
 
     /// Ends the run in a lane before its time; its figures are those so far.
@@ -458,6 +473,15 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
 
         self.commands[self.step as usize % RING] = u;
         let mut asked = self.delayed();
+        if let Some(most) = self.most_change {
+            for joint in 0..N {
+                let (from, to) = (self.command[joint], asked[joint]);
+                let change = to - from;
+                asked[joint] = change.abs().choose(most, to, from + change.clamp_symmetric(most));
+            }
+            self.command = asked;
+        }
+        let command = asked;
         if self.features.compensation {
             let gravity = if T::LANES == 1 {
                 gravity_single(&self.posture, &self.nominal)
@@ -475,7 +499,7 @@ impl<'a, const N: usize, C: Controller<N, T>, T: Lanes> Bundle<'a, N, C, T> {
         }
         let t_s = self.step as f64 * self.step_s;
         let (step, at, state) = (self.step, self.state, &self.controller_state);
-        recorder.sample(&Sample { step, t_s, at, measurement, goal, u, tau: given, state });
+        recorder.sample(&Sample { step, t_s, at, measurement, goal, u, command, tau: given, state });
 
         let torque = if self.features.pushes { self.pushed(&given) } else { given };
         let mut next = self.state;
@@ -615,7 +639,7 @@ pub fn simulate_many_while<const N: usize, P: Parameters<N>>(
 }
 
 /// Neighbours that can share a bundle.
-fn bundles<'a, 'b, const N: usize, P: Parameters<N>>(
+pub(crate) fn bundles<'a, 'b, const N: usize, P: Parameters<N>>(
     set: InstructionSet,
     runs: &'a [(Run<'b, N>, &'b P)],
 ) -> impl Iterator<Item = &'a [(Run<'b, N>, &'b P)]> {

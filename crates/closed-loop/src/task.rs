@@ -70,6 +70,8 @@ pub struct Task<const N: usize> {
     pub segments: Vec<TaskSegment<N>>,
     /// Whether motor torques are limited.
     pub torque_limits: bool,
+    /// The fastest that the motor follows a command, N m/s; at once when there is none.
+    pub torque_rate_limit_n_m_per_s: Option<f64>,
     /// Moves the controller's goal from one goal to the next; it jumps when there is none.
     pub goal_limiter: Option<GoalRateLimiter>,
     /// How the plant is integrated.
@@ -83,9 +85,12 @@ pub struct Task<const N: usize> {
 }
 
 impl<const N: usize> Task<N> {
-    /// Whether runs of both can share a bundle: the same sampling step, integrator and goal limiter.
+    /// Whether runs of both can share a bundle: the same sampling step, integrator, goal limiter and torque-rate limit.
     #[expect(clippy::float_cmp, reason = "the same number is meant")]
     pub fn steps_alike(&self, other: &Self) -> bool {
-        self.step_s == other.step_s && self.integrator == other.integrator && self.goal_limiter == other.goal_limiter
+        self.step_s == other.step_s
+            && self.integrator == other.integrator
+            && self.goal_limiter == other.goal_limiter
+            && self.torque_rate_limit_n_m_per_s == other.torque_rate_limit_n_m_per_s
     }
 }

@@ -1,7 +1,8 @@
-//! Where the flange is and how it moves.
+//! Where joints and flange are, and how the flange moves.
 //!
 //! | symbol | code | shape | unit |
 //! |--------|------|-------|------|
+//! | o_i | [`joint_origins`] | N x 3 | m |
 //! | x, R | [`flange_pose`] | 3, 3x3 | m, 1 |
 //! | J: `(v; w) = J dq` | [`flange_jacobian`] | 6 x N, linear rows first | m/rad, 1 |
 //!
@@ -21,6 +22,11 @@ fn pose<const N: usize, T: Real>(model: &Model<N, T>, base: &Base<N, T>) -> (Vec
         }
         _ => (model.flange_position, model.flange_rotation),
     }
+}
+
+/// Positions in m of the joint frames' origins in the base frame, base to tip, at `q` in rad: what a stick figure of the arm is drawn by. O(N), no heap.
+pub fn joint_origins<const N: usize, T: Real>(model: &Model<N, T>, q: &Joints<N, T>) -> [Vector3<T>; N] {
+    Base::at(model, q).origin
 }
 
 /// Position in m and axes (columns) of the flange in the base frame, at `q` in rad.

@@ -62,7 +62,7 @@ pub use coriolis::{coriolis_matrix, coriolis_torque, mass_matrix_derivatives};
 pub use dispatch::MOST_JOINTS;
 pub use energy::{kinetic_energy, potential_energy};
 pub use error::RobotError;
-pub use flange::{flange_jacobian, flange_pose};
+pub use flange::{flange_jacobian, flange_pose, joint_origins};
 pub use forward::{forward_dynamics, forward_dynamics_with_armature};
 pub use friction::{COULOMB_SPEED_RAD_PER_S, friction_slope, friction_torque};
 pub use gravity::{gravity_jacobian, gravity_torque};

@@ -5,7 +5,7 @@ mod common;
 use certune_dynamics::{
     JointMatrix, Joints, Model, State, coriolis_matrix, flange_jacobian, flange_pose, forward_dynamics,
     forward_dynamics_with_armature, friction_slope, friction_torque, gravity_jacobian, gravity_torque,
-    inverse_dynamics, inverse_dynamics_derivatives, linearise, mass_matrix,
+    inverse_dynamics, inverse_dynamics_derivatives, joint_origins, linearise, mass_matrix,
 };
 use common::{N, joints, robot, state};
 use proptest::prelude::*;
@@ -111,5 +111,17 @@ proptest! {
             let (j, k) = ((i + 1) % 3, (i + 2) % 3);
             prop_assert!((spin[(k, j)] - twist[i + 3]).abs() <= 1e-8);
         }
+    }
+    #[test]
+    fn joint_origins_keep_their_distances_and_end_at_the_flange(robot in robot(), at in state()) {
+        let robot = robot?.with_flange(certune_dynamics::Frame::IDENTITY)?;
+        let arm = Model::<N>::new(&robot)?;
+        let origins = joint_origins(&arm, &at.q);
+        let mut before = origins[0] * 0.0;
+        for (origin, link) in origins.iter().zip(robot.links()) {
+            prop_assert!(((origin - before).norm() - link.frame.position().norm()).abs() <= 1e-12);
+            before = *origin;
+        }
+        prop_assert!((before - flange_pose(&arm, &at.q).0).norm() <= 1e-12);
     }
 }

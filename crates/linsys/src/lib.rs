@@ -7,12 +7,16 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![forbid(unsafe_code)]
 
+#[cfg(feature = "std")]
+mod counted;
 pub mod hyperbolic;
 mod scalar;
 #[cfg(feature = "std")]
 mod spectrum;
 pub mod trig;
 
+#[cfg(feature = "std")]
+pub use counted::{Counted, Operations, operations, operations_by_kind};
 pub use scalar::{JointMatrix, Joints, Lanes, Real};
 #[cfg(feature = "std")]
 pub use spectrum::{Continuous, Discrete, Loop, LoopError, TimeDomain};

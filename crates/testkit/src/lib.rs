@@ -64,7 +64,6 @@
 #![forbid(unsafe_code)]
 
 mod arm;
-mod counted;
 mod draw;
 mod gains;
 mod joints;
@@ -72,7 +71,6 @@ mod plant;
 pub mod tolerance;
 
 pub use arm::{payload, serial_arm};
-pub use counted::{Counted, operations};
 pub use draw::{log_within, within};
 pub use gains::{AicRanges, PUBLISHED, aic_gains, shared_aic_gains};
 pub use joints::{FASTEST_RAD_PER_S, configuration, configuration_within, joint_state, joints_within};

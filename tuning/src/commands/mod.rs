@@ -3,6 +3,7 @@
 pub mod ask_tell;
 pub mod certify;
 pub mod claims;
+pub mod compare;
 pub mod constants;
 pub mod diff;
 pub mod evaluate;

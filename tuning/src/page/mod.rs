@@ -3,6 +3,7 @@
 //! What the record does not hold, the course of single runs, is simulated again: the same numbers come out, so `tune` and `report`
 //! make the same page. The nominal plant is the middle of the scenario's plant box.
 
+mod comparison;
 mod evidence;
 mod figures;
 mod learnt;
@@ -22,6 +23,7 @@ use crate::error::Error;
 use crate::promise;
 use crate::run::{Folder, Run};
 
+pub use comparison::comparison_page;
 pub use figures::{FIGURES, Spread, spread};
 pub use runs::largest_error;
 

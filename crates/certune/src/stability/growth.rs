@@ -77,6 +77,7 @@ pub fn growth<const N: usize>(
         start: goal + direction * START_RAD,
         segments: vec![TaskSegment { goal, steps }],
         torque_limits: false,
+        torque_rate_limit_n_m_per_s: None,
         goal_limiter: None,
         // A sampled refusal is about the semi-implicit step.
         integrator: Integrator {

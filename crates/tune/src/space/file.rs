@@ -267,6 +267,17 @@ impl SpaceFile {
         &self.goals
     }
 
+    /// The same space with a row held at one number on all joints. A knob that moved nothing else is gone; a row that no gains file has changes nothing.
+    #[must_use]
+    pub fn holding(mut self, row: &str, value: f64) -> Self {
+        self.fixed = self.fixed.with(row, PerJoint::Shared(value));
+        for knob in &mut self.knobs {
+            knob.rows.retain(|moved| *moved != row);
+        }
+        self.knobs.retain(|knob| !knob.rows.is_empty());
+        self
+    }
+
     /// The controller whose gains the space holds.
     pub const fn controller(&self) -> &'static str {
         self.fixed.controller()

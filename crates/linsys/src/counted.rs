@@ -3,32 +3,75 @@
 //! An addition, subtraction, multiplication, division or square root counts 1, a fused multiply-add 2; signs, sizes and choices are free. Sines, cosines and tangents
 //! count what their series take. Counts are kept by thread.
 
+use core::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 use std::cell::Cell;
-use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
 
-use certune_linsys::{Lanes, Real, hyperbolic, trig};
 use num_traits::{One, Zero};
 
-thread_local! {
-    static DONE: Cell<u64> = const { Cell::new(0) };
+use crate::scalar::{Lanes, Real};
+use crate::{hyperbolic, trig};
+
+/// Operations by their kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Operations {
+    /// Additions and subtractions, those of fused multiply-adds included.
+    pub additions: u64,
+    /// Multiplications, those of fused multiply-adds included.
+    pub multiplications: u64,
+    /// Divisions and square roots.
+    pub others: u64,
 }
 
-fn did(operations: u64) {
-    DONE.with(|done| done.set(done.get() + operations));
+impl Operations {
+    /// All together.
+    pub const fn total(self) -> u64 {
+        self.additions + self.multiplications + self.others
+    }
+
+    const fn plus(self, more: Self) -> Self {
+        Self {
+            additions: self.additions + more.additions,
+            multiplications: self.multiplications + more.multiplications,
+            others: self.others + more.others,
+        }
+    }
+}
+
+const ADDITION: Operations = Operations { additions: 1, multiplications: 0, others: 0 };
+const MULTIPLICATION: Operations = Operations { additions: 0, multiplications: 1, others: 0 };
+const OTHER: Operations = Operations { additions: 0, multiplications: 0, others: 1 };
+
+thread_local! {
+    static DONE: Cell<Operations> = const { Cell::new(Operations { additions: 0, multiplications: 0, others: 0 }) };
+}
+
+fn did(operations: Operations) {
+    DONE.with(|done| done.set(done.get().plus(operations)));
 }
 
 /// Floating-point operations of `work` on this thread, as far as it runs on [`Counted`].
 ///
 /// ```
-/// use certune_testkit::{Counted, operations};
+/// use certune_linsys::{Counted, operations_by_kind};
 ///
 /// let x = Counted(2.0);
-/// assert_eq!(operations(|| x * x + x), 2);
+/// let done = operations_by_kind(|| x * x + x);
+/// assert_eq!((done.additions, done.multiplications, done.others), (1, 1, 0));
 /// ```
-pub fn operations<R>(work: impl FnOnce() -> R) -> u64 {
+pub fn operations_by_kind<R>(work: impl FnOnce() -> R) -> Operations {
     let before = DONE.with(Cell::get);
     std::hint::black_box(work());
-    DONE.with(Cell::get) - before
+    let after = DONE.with(Cell::get);
+    Operations {
+        additions: after.additions - before.additions,
+        multiplications: after.multiplications - before.multiplications,
+        others: after.others - before.others,
+    }
+}
+
+/// [`operations_by_kind`], all together.
+pub fn operations<R>(work: impl FnOnce() -> R) -> u64 {
+    operations_by_kind(work).total()
 }
 
 /// A number whose operations are counted, see [`operations`].
@@ -36,11 +79,11 @@ pub fn operations<R>(work: impl FnOnce() -> R) -> u64 {
 pub struct Counted(pub f64);
 
 macro_rules! counted {
-    ($($operator:ident $function:ident $assign:ident $assign_function:ident),*) => {$(
+    ($($operator:ident $function:ident $assign:ident $assign_function:ident $kind:ident),*) => {$(
         impl $operator for Counted {
             type Output = Self;
             fn $function(self, other: Self) -> Self {
-                did(1);
+                did($kind);
                 Self(self.0.$function(other.0))
             }
         }
@@ -51,7 +94,12 @@ macro_rules! counted {
         }
     )*};
 }
-counted!(Add add AddAssign add_assign, Sub sub SubAssign sub_assign, Mul mul MulAssign mul_assign, Div div DivAssign div_assign);
+counted!(
+    Add add AddAssign add_assign ADDITION,
+    Sub sub SubAssign sub_assign ADDITION,
+    Mul mul MulAssign mul_assign MULTIPLICATION,
+    Div div DivAssign div_assign OTHER
+);
 
 impl Neg for Counted {
     type Output = Self;
@@ -80,14 +128,15 @@ impl Real for Counted {
         Self(x)
     }
     fn mul_add(self, factor: Self, addend: Self) -> Self {
-        did(2);
+        did(ADDITION);
+        did(MULTIPLICATION);
         Self(Real::mul_add(self.0, factor.0, addend.0))
     }
     fn sin_cos(self) -> (Self, Self) {
         trig::sin_cos(self)
     }
     fn sqrt(self) -> Self {
-        did(1);
+        did(OTHER);
         Self(self.0.sqrt())
     }
     fn abs(self) -> Self {
