@@ -33,12 +33,12 @@ fn reaches_the_goal(gains: &AicGains<7>, arm: &PlantNumbers<7>) -> Result<(), Te
 }
 
 /// Proptest's own runner, so that this story can look at a failure; in a test file the macro `proptest!` stands here.
-fn test(cases: u32, gains: &AicGains<7>) -> Result<(), TestError<PlantNumbers<7>>> {
+fn test(cases: u32, gains: &AicGains<7>) -> Result<(), Box<TestError<PlantNumbers<7>>>> {
     let rng = proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha);
     let config = Config { cases, failure_persistence: None, max_shrink_iters: 2000, ..Config::default() };
     // Links within 20 % of their masses, up to a full bottle in hand, friction, rotor inertia: what pick-and-place declares.
     let arms = plant_numbers::<7>(&PlantRanges::pick_and_place());
-    TestRunner::new_with_rng(config, rng).run(&arms, |arm| reaches_the_goal(gains, &arm))
+    TestRunner::new_with_rng(config, rng).run(&arms, |arm| reaches_the_goal(gains, &arm)).map_err(Box::new)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -48,7 +48,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // A torque too slow for a bottle: the runner finds an arm that misses, and makes it as ordinary as a failing arm can be.
     let slow = AicGains { kappa_a: [100.0; 7], ..published };
-    let Err(TestError::Fail(reason, arm)) = test(64, &slow) else { return Err("slow gains passed".into()) };
+    let Err(TestError::Fail(reason, arm)) = test(64, &slow).map_err(|error| *error) else {
+        return Err("slow gains passed".into());
+    };
     println!("\nwith kappa_a = 100: {reason}, on the arm\n{arm:.2?}");
     assert!(reaches_the_goal(&slow, &arm).is_err() && reaches_the_goal(&published, &arm).is_ok());
     // What is left is what matters: the links are those of the description, the hand holds most of a full bottle.
