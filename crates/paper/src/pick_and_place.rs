@@ -79,15 +79,14 @@ impl PickAndPlace<'_> {
         &self,
         contender: &Contender,
         title: &Title<'_>,
-        every: u64,
         replay: bool,
     ) -> Result<(Metrics, Trace), CompareError> {
         let stand = Stand::nominal(self.robot, &self.scenario, self.inputs.size.seed)?;
         let law = Law::new(&contender.gains, self.scenario.step_s)?;
         let limits = self.limits();
         let model = stand.plants.first().map(Plant::model).filter(|_| replay);
-        let row_s = every as f64 * self.scenario.step_s;
-        let recorder = || Both(Watch::new(&limits, self.scenario.step_s), rows(every));
+        let row_s = TRACE_EVERY as f64 * self.scenario.step_s;
+        let recorder = || Both(Watch::new(&limits, self.scenario.step_s), rows(TRACE_EVERY));
         let mut found = stand.run(&law, recorder, |metrics, Both(watch, rows)| {
             let stop_s = watch.monitor.first().map(|stop| stop.t_s);
             (metrics, runs::trace(title, &rows, row_s, model, stop_s))
@@ -120,7 +119,7 @@ pub(crate) fn approximated(
     for (contender, result) in those.iter().zip(&mut results) {
         let title = Title { experiment: "approximated", contender: &contender.name, case: "" };
         let replay = [names::AIC, names::MRAC].contains(&contender.name.as_str());
-        let (metrics, trace) = task.nominal(contender, &title, TRACE_EVERY, replay)?;
+        let (metrics, trace) = task.nominal(contender, &title, replay)?;
         result.nominal = Some(metrics);
         if [names::AIC, names::AIC_TUNED, names::MRAC, names::MRAC_MODEL, names::MRAC_MATCHED]
             .contains(&contender.name.as_str())
@@ -231,7 +230,7 @@ pub(crate) fn transfer(
             contender: &contender.name,
             case: "noise, one sample of delay, limited torque rate",
         };
-        traces.push(on_robot(inputs, real).nominal(contender, &title, TRACE_EVERY, false)?.1);
+        traces.push(on_robot(inputs, real).nominal(contender, &title, false)?.1);
     }
     Ok(Transfer {
         conditions: "identified arm with hand, masses uncertain by 20 %, gravity compensated by the robot, goals A and B for 6 s each".to_owned(),
