@@ -108,7 +108,12 @@ impl<const N: usize> SafetyMonitor<N> {
 
     /// What would have stopped the robot: the earliest violation, of those in one sample the first in the order of [`Guarded::ALL`].
     pub fn first(&self) -> Option<Violation> {
-        self.found.into_iter().flatten().reduce(|a, b| if b.t_s < a.t_s { b } else { a })
+        self.first_of_any(&Guarded::ALL)
+    }
+
+    /// The earliest violation of these kinds, of those in one sample the first of the list.
+    pub fn first_of_any(&self, kinds: &[Guarded]) -> Option<Violation> {
+        kinds.iter().filter_map(|kind| self.first_of(*kind)).reduce(|a, b| if b.t_s < a.t_s { b } else { a })
     }
 }
 

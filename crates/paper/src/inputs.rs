@@ -71,7 +71,7 @@ pub struct Size {
     pub seed: u64,
     /// Arms of an experiment.
     pub arms: usize,
-    /// Arms of a cell of the grid.
+    /// Arms of a cell of the grid; without any there is no grid.
     pub grid_arms: usize,
     /// Candidates of a search.
     pub candidates: usize,
@@ -143,7 +143,7 @@ impl Inputs {
                 return Err(CompareError::Geometry { robot: self.robot.name().to_owned(), link: link.name.clone() });
             }
         }
-        if self.size.arms == 0 || self.size.grid_arms == 0 {
+        if self.size.arms == 0 {
             return Err(CompareError::NoArms);
         }
         let enough = |scenario: &Scenario, what, found: usize, expected| {

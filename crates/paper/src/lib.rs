@@ -1,6 +1,19 @@
 //! The experiments of the paper that both controllers come from, run again on our plants, and what is left of its statements.
 //!
 //! C. Pezzato, R. Ferrari, C. Hernandez Corbato, "A Novel Adaptive Controller for Robot Manipulators Based on Active Inference", IEEE Robotics and Automation Letters 5(2), 2020.
+//!
+//! | module | what it holds |
+//! |--------|---------------|
+//! | `inputs` | arms, gains, scenarios and search spaces, given as data |
+//! | `tuning` | searches for gains of both controllers, alike in everything |
+//! | `pick_and_place` | the approximated model, and the same gains on the identified arm over a grid of plant effects |
+//! | `payloads`, `push`, `cost` | two bottles; a push at the flange; operations and time of a step |
+//! | `runs`, `watch` | controllers on many arms side by side, and what is read off a run while it goes on |
+//! | [`statistics`] | quantiles, and an exact paired test |
+//! | [`record`](mod@record) | what a comparison leaves behind |
+//! | [`statements`] | the paper's statements in our words, with rules, readings and verdicts |
+//!
+//! Limits: everything is simulated; rigid joints and links, no Coulomb friction, no contact. The gravity compensation of the identified arm knows the arm's own masses exactly.
 #![forbid(unsafe_code)]
 
 mod cost;

@@ -10,7 +10,7 @@
 //! | `ripple_rad_per_s2` | with the full bottle, root mean square of the acceleration while it is carried, worst joint, from velocities 10 ms apart | rad/s² |
 
 use certune_closed_loop::scenario::{Goal, Noise};
-use certune_closed_loop::{Plant, Row, Scenario};
+use certune_closed_loop::{Row, Scenario};
 use certune_linsys::Joints;
 
 use crate::error::CompareError;
@@ -65,7 +65,7 @@ pub(crate) fn payloads(
     let mut results = Vec::new();
     for contender in those {
         let mut found: [Vec<(Moves, Option<f64>)>; 2] = [Vec::new(), Vec::new()];
-        for (bottle, (scenario, found)) in scenarios.iter().zip(&mut found).enumerate() {
+        for (scenario, found) in scenarios.iter().zip(&mut found) {
             let stand = Stand::new(&inputs.robot, scenario, size.seed, size.arms)?;
             let law = Law::new(&contender.gains, scenario.step_s)?;
             *found = stand.run(
@@ -77,8 +77,7 @@ pub(crate) fn payloads(
                 },
             );
             if [names::AIC_ROBOT, names::MRAC_ROBOT].contains(&contender.name.as_str()) {
-                // The second bottle is replayed.
-                traces.push(nominal(inputs, scenario, contender, bottle == 1)?);
+                traces.push(nominal(inputs, scenario, contender)?);
             }
         }
         let row_s = EVERY as f64 * scenarios[0].step_s;
@@ -96,16 +95,15 @@ pub(crate) fn payloads(
     Ok(Experiment { name: "payloads".to_owned(), conditions, results, tests: Vec::new() }.with_tests(&PAIRS))
 }
 
-fn nominal(inputs: &Inputs, scenario: &Scenario, contender: &Contender, replay: bool) -> Result<Trace, CompareError> {
+fn nominal(inputs: &Inputs, scenario: &Scenario, contender: &Contender) -> Result<Trace, CompareError> {
     let stand = Stand::nominal(&inputs.robot, scenario, inputs.size.seed)?;
     let law = Law::new(&contender.gains, scenario.step_s)?;
     let mass = scenario.payloads.first().map_or(0.0, |event| event.mass_kg);
     let case = format!("{mass} kg");
     let title = Title { experiment: "payloads", contender: &contender.name, case: &case };
     let row_s = TRACE_EVERY as f64 * scenario.step_s;
-    let model = stand.plants.first().map(Plant::model).filter(|_| replay);
     stand
-        .run(&law, || rows(TRACE_EVERY), |_, rows| runs::trace(&title, &rows, row_s, model, None))
+        .run(&law, || rows(TRACE_EVERY), |_, rows| runs::trace(&title, &rows, row_s, None, None))
         .pop()
         .ok_or(CompareError::NoArms)
 }

@@ -56,13 +56,19 @@ impl PickAndPlace<'_> {
                 || Watch::new(&limits, step_s),
                 |metrics, watch| {
                     let mut figures = of_run(&metrics, &watch);
-                    figures.extend([watch.monitor.first(), rate_apart(&watch)].map(|stop| stop.map(|stop| stop.t_s)));
+                    figures.extend(
+                        [watch.monitor.first(), rate_apart(&watch), motion(&watch)]
+                            .map(|stop| stop.map(|stop| stop.t_s)),
+                    );
                     (figures, metrics.diverged_at_s.is_some())
                 },
             );
             let diverged = found.iter().filter(|(_, diverged)| *diverged).count();
             let figures: Vec<Vec<Option<f64>>> = found.into_iter().map(|(figures, _)| figures).collect();
-            let names: Vec<&str> = FIGURES.into_iter().chain(["safety_stop_s", "safety_stop_rate_apart_s"]).collect();
+            let names: Vec<&str> = FIGURES
+                .into_iter()
+                .chain(["safety_stop_s", "safety_stop_rate_apart_s", "safety_stop_motion_s"])
+                .collect();
             results.push(arms(&contender.name, &names, &figures, diverged));
         }
         Ok(results)
@@ -73,15 +79,14 @@ impl PickAndPlace<'_> {
         &self,
         contender: &Contender,
         title: &Title<'_>,
-        every: u64,
         replay: bool,
     ) -> Result<(Metrics, Trace), CompareError> {
         let stand = Stand::nominal(self.robot, &self.scenario, self.inputs.size.seed)?;
         let law = Law::new(&contender.gains, self.scenario.step_s)?;
         let limits = self.limits();
         let model = stand.plants.first().map(Plant::model).filter(|_| replay);
-        let row_s = every as f64 * self.scenario.step_s;
-        let recorder = || Both(Watch::new(&limits, self.scenario.step_s), rows(every));
+        let row_s = TRACE_EVERY as f64 * self.scenario.step_s;
+        let recorder = || Both(Watch::new(&limits, self.scenario.step_s), rows(TRACE_EVERY));
         let mut found = stand.run(&law, recorder, |metrics, Both(watch, rows)| {
             let stop_s = watch.monitor.first().map(|stop| stop.t_s);
             (metrics, runs::trace(title, &rows, row_s, model, stop_s))
@@ -114,9 +119,11 @@ pub(crate) fn approximated(
     for (contender, result) in those.iter().zip(&mut results) {
         let title = Title { experiment: "approximated", contender: &contender.name, case: "" };
         let replay = [names::AIC, names::MRAC].contains(&contender.name.as_str());
-        let (metrics, trace) = task.nominal(contender, &title, TRACE_EVERY, replay)?;
+        let (metrics, trace) = task.nominal(contender, &title, replay)?;
         result.nominal = Some(metrics);
-        if contender.name != names::MRAC_GOAL_SCALED {
+        if [names::AIC, names::AIC_TUNED, names::MRAC, names::MRAC_MODEL, names::MRAC_MATCHED]
+            .contains(&contender.name.as_str())
+        {
             traces.push(trace);
         }
     }
@@ -182,7 +189,8 @@ pub(crate) fn transfer(
 ) -> Result<Transfer, CompareError> {
     let those = chosen(contenders, &CONTENDERS);
     let mut cells = Vec::new();
-    for friction_n_m_s_per_rad in [0.0, FRICTION_N_M_S_PER_RAD] {
+    let frictions: &[f64] = if inputs.size.grid_arms > 0 { &[0.0, FRICTION_N_M_S_PER_RAD] } else { &[] };
+    for &friction_n_m_s_per_rad in frictions {
         for rotor_inertia_kg_m2 in [0.0, ROTOR_KG_M2] {
             for noise in [false, true] {
                 for delay_samples in 0..=2 {
@@ -214,13 +222,15 @@ pub(crate) fn transfer(
             Experiment { name: name.to_owned(), conditions: conditions.to_owned(), results, tests: Vec::new() };
         Ok(experiment.with_tests(&PAIRS))
     };
-    for contender in &those {
+    for contender in
+        chosen(contenders, &[names::AIC, names::AIC_ROBOT, names::MRAC, names::MRAC_ROBOT, names::MRAC_MATCHED])
+    {
         let title = Title {
             experiment: "transfer",
             contender: &contender.name,
             case: "noise, one sample of delay, limited torque rate",
         };
-        traces.push(on_robot(inputs, real).nominal(contender, &title, TRACE_EVERY, false)?.1);
+        traces.push(on_robot(inputs, real).nominal(contender, &title, false)?.1);
     }
     Ok(Transfer {
         conditions: "identified arm with hand, masses uncertain by 20 %, gravity compensated by the robot, goals A and B for 6 s each".to_owned(),
@@ -232,15 +242,19 @@ pub(crate) fn transfer(
 
 /// The first stop for anything but a torque that is too fast: without a limiter, every jump of a torque is.
 fn rate_apart(watch: &Watch) -> Option<Violation> {
-    let kinds = [Guarded::Range, Guarded::Speed, Guarded::Torque];
-    let stops = kinds.into_iter().filter_map(|kind| watch.monitor.first_of(kind));
-    stops.reduce(|a, b| if b.t_s < a.t_s { b } else { a })
+    watch.monitor.first_of_any(&[Guarded::Range, Guarded::Speed, Guarded::Torque])
+}
+
+/// The first stop for what the arm does, not for what it is told to.
+fn motion(watch: &Watch) -> Option<Violation> {
+    watch.monitor.first_of_any(&[Guarded::Range, Guarded::Speed])
 }
 
 /// What is kept of a run in a cell.
 struct Seen {
     stop: Option<Violation>,
     stop_rate_apart: Option<Violation>,
+    stop_motion: bool,
     worst_error_rad: Option<f64>,
     torque_rate: [Option<f64>; JOINTS],
     acceleration: [Option<f64>; JOINTS],
@@ -262,6 +276,7 @@ fn cell(inputs: &Inputs, effects: Effects, contenders: &[&Contender]) -> Result<
                 Seen {
                     stop: watch.monitor.first(),
                     stop_rate_apart: rate_apart(&watch),
+                    stop_motion: motion(&watch).is_some(),
                     worst_error_rad: ran.then(|| metrics.worst_final_error_rad()),
                     torque_rate: watch.torque_rate().map(|rate| rate.filter(|_| ran)),
                     acceleration: watch.acceleration().map(|rate| rate.filter(|_| ran)),
@@ -282,6 +297,7 @@ fn summary(contender: &str, seen: &[Seen]) -> CellResult {
         contender: contender.to_owned(),
         stopped: seen.iter().filter(|seen| seen.stop.is_some()).count(),
         stopped_rate_apart: stops.len(),
+        stopped_motion: seen.iter().filter(|seen| seen.stop_motion).count(),
         stop_s: median(&mut stops.iter().map(|stop| Some(stop.t_s))),
         stop_for: most(stops.iter().map(|stop| stop.guarded as usize)).map(|kind| Guarded::ALL[kind]),
         stop_joint: most(stops.iter().map(|stop| stop.joint)),

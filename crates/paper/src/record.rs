@@ -255,6 +255,8 @@ pub struct CellResult {
     pub stopped: usize,
     /// The same, a torque that is too fast apart.
     pub stopped_rate_apart: usize,
+    /// Arms that would have stopped for what they did, range or speed, whatever they were told.
+    pub stopped_motion: usize,
     /// The median of the times of these stops, s.
     pub stop_s: Option<f64>,
     /// What most of them were for.

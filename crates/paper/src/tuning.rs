@@ -51,7 +51,7 @@ pub(crate) fn tune(inputs: &Inputs, told: &dyn Fn(&str)) -> Result<(Vec<Contende
     if let Some(gains) = &inputs.tuned_aic {
         add(names::AIC_TUNED, "AIC, tuned gains as given", gains.clone());
     } else {
-        told(names::AIC_TUNED);
+        told(&format!("searching for {}", names::AIC_TUNED));
         let start = &published.aic_simulation;
         let (gains, run) = searched(inputs, names::AIC_TUNED, &inputs.spaces.aic, start, &scenario)?;
         add(names::AIC_TUNED, "AIC, tuned on the approximated model", gains);
@@ -69,11 +69,11 @@ pub(crate) fn tune(inputs: &Inputs, told: &dyn Fn(&str)) -> Result<(Vec<Contende
         let matched = inputs.spaces.mrac.clone().holding(row, omega);
         let start = published.mrac_simulation.clone();
         let in_matched = start.clone().with(row, PerJoint::Shared(omega));
-        told(names::MRAC_MATCHED);
+        told(&format!("searching for {}", names::MRAC_MATCHED));
         let (gains, run) = searched(inputs, names::MRAC_MATCHED, &matched, &in_matched, &scenario)?;
         add(names::MRAC_MATCHED, "MRAC, tuned on the approximated model, its reference as fast as the AIC's", gains);
         searches.push(run);
-        told(names::MRAC_FREE);
+        told(&format!("searching for {}", names::MRAC_FREE));
         let (gains, run) = searched(inputs, names::MRAC_FREE, &inputs.spaces.mrac, &start, &scenario)?;
         add(names::MRAC_FREE, "MRAC, tuned on the approximated model, the speed of its reference free", gains);
         searches.push(run);

@@ -100,7 +100,7 @@ fn figures_of_the_nominal_arm_are_those_of_its_rows() {
                 let settled = rows[outside].t_s - segment.from_s;
                 // Samples lie within the 10 ms behind the row.
                 let told = segment.settling_time_s[joint].expect("it settles");
-                assert!((settled..settled + 0.011).contains(&told), "{settled} {told}");
+                assert!((settled - 1e-9..settled + 0.0101).contains(&told), "{settled} {told}");
             }
             let speed = (from..until).map(|row| rows[row].dq[joint].abs()).fold(0.0, f64::max);
             let told = segment.peak_speed_rad_per_s[joint];
@@ -184,7 +184,8 @@ fn given_gains_are_not_searched() {
     let preset = |text| Some(GainsFile::parse(Path::new("gains"), text).expect("a preset").gains);
     let tuned_aic = preset(include_str!("../../../tuning/presets/pezzato2020-libfranka.toml"));
     let tuned_mrac = preset(include_str!("../../../tuning/presets/pezzato2020-mrac-robot.toml"));
-    let size = Size { arms: 1, ..small().size };
+    // Without the grid: it has tests enough.
+    let size = Size { arms: 1, grid_arms: 0, ..small().size };
     let inputs = Inputs { tuned_aic: tuned_aic.clone(), tuned_mrac, size, ..small() };
     let found = compare(&inputs, &|_| ()).expect("a comparison");
     assert!(found.effort.searches.is_empty());

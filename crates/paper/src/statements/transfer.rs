@@ -128,47 +128,56 @@ pub(super) fn jitter_at_joint_6(found: &Comparison) -> Statement {
 
 pub(super) fn mrac_stops(found: &Comparison) -> Statement {
     let mut draft = Draft::new();
-    let [ideal, robot] = [&found.transfer.ideal, &found.transfer.robot].map(|experiment| experiment.of(names::MRAC));
-    let at_once = |arms: Option<&Arms>| {
-        arms.and_then(|arms| share(arms, "safety_stop_rate_apart_s", |time_s| time_s <= AT_ONCE_S))
+    let mut at_once = |kind: &str, place: &str, arms: Option<&Arms>| {
+        let share = arms.and_then(|arms| share(arms, &format!("safety_stop_{kind}_s"), |time_s| time_s <= AT_ONCE_S));
+        draft.read(&format!("mrac_share_stopped_at_once_by_{kind}_{place}"), share)
     };
-    let on_robot = draft.read("mrac_share_stopped_at_once", at_once(robot));
-    let on_ideal = draft.read("mrac_share_stopped_at_once_without_effects", at_once(ideal));
-    let too_fast = draft.read("mrac_share_with_too_fast_a_torque_without_limiter", stopped(ideal));
-    let limited = draft.read(
-        "mrac_share_stopped_with_limiter_and_delay",
-        stopped_in(found, names::MRAC, |effects| effects.torque_rate_limited && effects.delay_samples >= 1),
-    );
-    let friction = draft.read(
-        "mrac_share_stopped_by_friction_and_noise_alone",
-        stopped_in(found, names::MRAC, |effects| {
-            !effects.torque_rate_limited
-                && effects.delay_samples == 0
-                && effects.rotor_inertia_kg_m2 > 0.0
-                && effects.friction_n_m_s_per_rad > 0.0
-                && effects.noise
-        }),
-    );
+    let [ideal, robot] = [&found.transfer.ideal, &found.transfer.robot].map(|experiment| experiment.of(names::MRAC));
+    let (command_robot, command_ideal) =
+        (at_once("rate_apart", "on_robot", robot), at_once("rate_apart", "without_effects", ideal));
+    let (motion_robot, motion_ideal) =
+        (at_once("motion", "on_robot", robot), at_once("motion", "without_effects", ideal));
+    let mut in_grid = |name: &str, chosen: &dyn Fn(&Effects) -> bool| {
+        let (mut stopped, mut of) = (0, 0);
+        for (_, result) in cells(found, names::MRAC, chosen) {
+            stopped += result.stopped_motion;
+            of += found.question.grid_arms;
+        }
+        draft.read(name, (of > 0).then(|| stopped as f64 / of as f64))
+    };
+    let rotor = |effects: &Effects| effects.rotor_inertia_kg_m2 > 0.0;
+    let limiter = in_grid("mrac_share_moving_too_far_or_fast_with_limiter", &|effects| {
+        rotor(effects) && effects.torque_rate_limited
+    });
+    let rest = in_grid("mrac_share_moving_too_far_or_fast_without_limiter", &|effects| {
+        rotor(effects) && !effects.torque_rate_limited
+    });
     let words = Words {
         name: "mrac-stops",
         section: "experiments",
         statement: "MRAC with the gains of the simulation triggers the robot's safety stop at once.",
-        rule: "agrees if, whatever the plant effects, range, speed or torque stop at least 95 % of the arms within a second; only if, when that holds with noise, a sample of delay and a limited torque rate and not without",
+        rule: "agrees if what the arm does (range, speed) stops at least 95 % of the arms within a second with and without noise, delay and limiter; only if, when it does with them, or when a command beyond the motors' torque counts as well",
         figure: "transfer-grid",
         command: COMPARE,
     };
     let measured = format!(
-        "with noise, delay and limiter {} % of the arms are stopped within a second, without {} %; in the grid {} % with limiter and delay, {} % by friction and noise alone; without a limiter the torque's own rate would stop {} %",
-        short(100.0 * on_robot),
-        short(100.0 * on_ideal),
-        short(100.0 * limited),
-        short(100.0 * friction),
-        short(100.0 * too_fast)
+        "with noise, a sample of delay and the limiter {} % of the arms move too far or too fast within a second, without them {} %; in the grid with rotor inertia {} % do with a limited torque rate and {} % without; the command goes beyond the motors' torque at once on {} and {} %",
+        short(100.0 * motion_robot),
+        short(100.0 * motion_ideal),
+        short(100.0 * limiter),
+        short(100.0 * rest),
+        short(100.0 * command_robot),
+        short(100.0 * command_ideal)
     );
-    let ruling = match (on_robot >= NEARLY_ALL, on_ideal >= NEARLY_ALL) {
-        (true, true) => Ruling::Agrees,
-        (true, false) => Ruling::OnlyIf("the torque's rate is limited and the torque delayed by a sample, or a rate above the limit counts as the reason for the stop".to_owned()),
-        (false, _) => Ruling::DoesNotAgree,
+    let still = if rest <= HARDLY_ANY { "; friction and noise alone do not make it move too fast" } else { "" };
+    let ruling = match (motion_robot >= NEARLY_ALL, motion_ideal >= NEARLY_ALL, command_ideal >= NEARLY_ALL) {
+        (true, true, _) => Ruling::Agrees,
+        (true, false, true) => Ruling::OnlyIf(
+            "the torque's rate is limited, as the robot's interface does, or a command beyond the motors' torque stops the arm".to_owned() + still,
+        ),
+        (true, false, false) => Ruling::OnlyIf("the torque's rate is limited, as the robot's interface does".to_owned()),
+        (false, _, true) => Ruling::OnlyIf("a command beyond the motors' torque stops the arm".to_owned()),
+        (false, _, false) => Ruling::DoesNotAgree,
     };
     draft.state(words, measured, ruling)
 }

@@ -141,6 +141,11 @@ fn transfer(found: &Comparison) -> Experiment {
         let cells: Vec<&GridPoint> = found.transfer.cells.iter().filter(chosen).collect();
         experiment.figures.push(figure(id, title, caption, grid(found, &cells)));
     }
+    let of = [names::AIC, names::AIC_ROBOT, names::MRAC, names::MRAC_ROBOT, names::MRAC_MATCHED];
+    if let Some(drawing) = responses(found, "transfer", &of, Shown::Angles, &[]) {
+        let caption = "Nominal arm with noise, delay and limiter; a run that ran away ends.";
+        experiment.figures.push(figure("transfer-angles", "Joint angles on the robot", caption, drawing));
+    }
     experiment.figures.push(figure(
         "transfer-jitter",
         "Jitter by joint",
