@@ -94,7 +94,7 @@ fn claims() -> Outcome {
     command.env("CERTUNE_WRITE_CLAIMS", "1");
     run("claims", command)?;
     // The page lists what the certificates say, so it comes after them.
-    let mut command = cargo(&["test", "--release", "--package", "proofs", "--test", "index"]);
+    let mut command = cargo(&["test", "--release", "--package", "proofs", "--test", "claims", "index::"]);
     command.env("CERTUNE_WRITE_CLAIMS", "1");
     run("the page that lists them", command)
 }

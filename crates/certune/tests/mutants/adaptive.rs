@@ -6,7 +6,7 @@ use certune::verify::{
 };
 use nalgebra::DMatrix;
 
-use crate::loops::ends;
+use super::loops::ends;
 
 const SLACK: f64 = 1e-6;
 const MEMBERS: usize = 24;

@@ -6,7 +6,7 @@ use certune::verify::{
 };
 use nalgebra::{Complex, DMatrix};
 
-use crate::loops::{Joint, Motion, point};
+use super::loops::{Joint, Motion, point};
 
 /// Eigenvalues in floating point against a rate proved exactly.
 const SLACK: f64 = 1e-6;

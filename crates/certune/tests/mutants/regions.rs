@@ -7,7 +7,7 @@ use certune::verify::{
 };
 use nalgebra::{DMatrix, DVector};
 
-use crate::loops::{Joint, Motion, Sample, ends, point};
+use super::loops::{Joint, Motion, Sample, ends, point};
 
 const SLACK: f64 = 1e-6;
 const POINTS: usize = 12;

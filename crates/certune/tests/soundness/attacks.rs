@@ -11,10 +11,10 @@ use certune::verify::{
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::RngCore;
 
-use crate::chance::{angles, direction, uniform, vector};
-use crate::continuous::{Continuous, Loop};
-use crate::held::Held;
-use crate::subjects::Subject;
+use super::chance::{angles, direction, uniform, vector};
+use super::continuous::{Continuous, Loop};
+use super::held::Held;
+use super::subjects::Subject;
 
 /// Eigenvalues of a 42 x 42 matrix in floating point, against a rate proved exactly.
 const EIGENVALUE_SLACK_PER_S: f64 = 1e-6;

@@ -16,8 +16,8 @@ use certune::verify::{Claim, ClaimKind, Number, triangle};
 use nalgebra::{DMatrix, DVector};
 use rand_chacha::ChaCha8Rng;
 
-use crate::chance::{angles, direction, stream, uniform, vector};
-use crate::continuous::{Continuous, Loop};
+use super::chance::{angles, direction, stream, uniform, vector};
+use super::continuous::{Continuous, Loop};
 
 const N: usize = 7;
 const STATES: usize = 5;

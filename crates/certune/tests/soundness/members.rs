@@ -6,7 +6,7 @@ use certune::certify::FamilyValues;
 use certune::dynamics::{Model, Payload, Robot, gravity_torque, mass_matrix};
 use certune::linsys::Joints;
 
-use crate::chance::{direction, stream, uniform};
+use super::chance::{direction, stream, uniform};
 
 const N: usize = 7;
 

@@ -15,8 +15,8 @@ use certune::{ArmCertifier, Effort};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::RngCore;
 
-use crate::chance::{stream, uniform};
-use crate::continuous::{Continuous, Loop};
+use super::chance::{stream, uniform};
+use super::continuous::{Continuous, Loop};
 
 const N: usize = 7;
 const STEP_S: f64 = 1e-3;

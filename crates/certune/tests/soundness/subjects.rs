@@ -15,7 +15,7 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::RngCore;
 
-use crate::chance::{pick, short, stream, uniform};
+use super::chance::{pick, short, stream, uniform};
 
 /// An arm with a family of plants, its constants found.
 pub struct Subject<const N: usize> {
