@@ -74,7 +74,7 @@ pub(crate) fn html(template: &'static str, page: &impl Serialize) -> Result<Stri
     environment.add_template("macros.html", MACROS)?;
     environment.add_template("page.html", template)?;
     environment.add_global("style", STYLE);
-    environment.add_global("script", READINGS);
+    environment.add_global("readings_script", READINGS);
     let html = environment.get_template("page.html")?.render(Value::from(Serde(page)))?;
     // The macros at the head of the template leave blank lines.
     Ok(html.trim_start().to_owned())

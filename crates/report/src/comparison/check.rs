@@ -180,9 +180,9 @@ fn names<'a>(ids: impl Iterator<Item = &'a String>, kind: &'static str) -> Check
     Ok(())
 }
 
-fn is_known(id: &String, known: &HashSet<&str>, place: impl Fn() -> String, kind: &'static str) -> Checked {
-    let error = || ReportError::Unknown { place: place(), id: id.clone(), kind };
-    if known.contains(id.as_str()) { Ok(()) } else { Err(error()) }
+fn is_known(id: &str, known: &HashSet<&str>, place: impl Fn() -> String, kind: &'static str) -> Checked {
+    let error = || ReportError::Unknown { place: place(), id: id.to_owned(), kind };
+    if known.contains(id) { Ok(()) } else { Err(error()) }
 }
 
 fn holds(condition: bool, place: impl Fn() -> String, expected: &'static str) -> Checked {

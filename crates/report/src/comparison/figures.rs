@@ -24,7 +24,7 @@ pub(super) struct FigureView<'a> {
     id: &'a str,
     title: &'a str,
     caption: &'a str,
-    /// Legend; empty where each curve carries its name.
+    /// Legend; empty where each curve carries its name. A wide figure has names in it, and needs none on a desk.
     key: Vec<Player<'a>>,
     has_goal: bool,
     /// What the bands are.
@@ -85,9 +85,7 @@ pub(super) fn figure<'a>(figure: &'a ExperimentFigure, cast: Cast<'a>) -> Result
     match drawing {
         Drawing::Responses(responses) => {
             let curves = responses.panels.iter().flat_map(|panel| &panel.curves);
-            if responses.panels.len() > 1 {
-                view.key = cast.players(curves.map(|curve| &curve.controller));
-            }
+            view.key = cast.players(curves.map(|curve| &curve.controller));
             view.has_goal = responses.panels.iter().any(|panel| !panel.goal.is_empty());
             view.band = &responses.band;
             view.drawn = responses::draw(responses, cast)?;

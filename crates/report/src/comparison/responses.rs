@@ -6,7 +6,7 @@ use crate::error::ReportError;
 use crate::figure::span;
 use crate::format;
 use crate::panels::over_time::{Curve, OverTime};
-use crate::panels::{THIRD, TwoWidths};
+use crate::panels::{PHONE, THIRD, TwoWidths};
 use crate::record::{ResponsePanel, Responses};
 
 /// A joint that moves less than this part of the one that moves most counts as resting.
@@ -25,7 +25,8 @@ pub(super) fn draw(responses: &Responses, cast: Cast<'_>) -> Result<Drawn<'stati
     let figure = |panel| over_time(responses, panel, cast, scale);
     if let [panel] = &responses.panels[..] {
         let figure = figure(panel);
-        let plot = |size: (f64, f64)| figure.plot(size, true);
+        // On a phone names at the ends would leave no room for the curves.
+        let plot = |size: (f64, f64)| figure.plot(size, size.0 > PHONE.0);
         let both = match figure.readings() {
             Some(readings) => TwoWidths::with(plot, &readings),
             None => TwoWidths::new(plot),

@@ -2,6 +2,9 @@
 
 use crate::format;
 
+/// The largest number on an axis.
+const LARGEST: f64 = 1e290;
+
 /// Decades of a logarithmic axis: below them lies nothing that a reader could use.
 const MOST_DECADES: i32 = 12;
 
@@ -25,9 +28,12 @@ enum Scale {
 impl Axis {
     /// Equal distances, about `count` ticks; the range is widened until it has a size.
     pub(crate) fn linear(caption: impl Into<String>, (lower, upper): (f64, f64), count: usize) -> Self {
+        // A range must have a finite size: what lies beyond is drawn on the edge.
+        let [lower, upper] = [lower, upper].map(|end| end.clamp(-LARGEST, LARGEST));
         let size = upper - lower;
         let tiny = 1e-9_f64.max(1e-6 * lower.abs().max(upper.abs()));
-        let (lower, upper) = if size > tiny { (lower, upper) } else { (lower - 0.5, upper + 0.5) };
+        let missing = if size > tiny { 0.0 } else { tiny.max(0.5) };
+        let (lower, upper) = (lower - missing, upper + missing);
         let step = nice_step((upper - lower) / count.max(1) as f64);
         let first = (lower / step - 1e-6).ceil() as i64;
         // A recording ends one sample early: its last round tick still counts.
@@ -46,7 +52,7 @@ impl Axis {
     /// Equal ratios; both ends must be positive, otherwise the lower end is put six decades below the upper. More than
     /// [`MOST_DECADES`] are not shown.
     pub(crate) fn log(caption: impl Into<String>, (lower, upper): (f64, f64)) -> Self {
-        let upper = if upper > 1e-290 { upper.min(1e290) } else { 1.0 };
+        let upper = if upper > 1.0 / LARGEST { upper.min(LARGEST) } else { 1.0 };
         let lower = if lower > 0.0 && lower < upper { lower } else { upper * 1e-6 };
         let lower = lower.max(upper * 10_f64.powi(-MOST_DECADES));
         let margin = (upper / lower).powf(0.05).max(1.1);
@@ -153,6 +159,16 @@ mod tests {
         let log = Axis::log("", (0.0, 0.0));
         assert_eq!(log.fraction(0.0), Some(0.0));
         assert_eq!(log.fraction(f64::NAN), None);
+    }
+
+    #[test]
+    fn the_largest_numbers_have_an_axis() {
+        let whole = Axis::padded("", (f64::MIN, f64::MAX), 5);
+        assert!((2..9).contains(&whole.ticks().len()), "{:?}", whole.ticks());
+        assert_eq!(Axis::linear("", (1e200, 1e200), 5).fraction(1e200), Some(0.5));
+        assert_eq!([whole.fraction(f64::MAX), whole.fraction(0.0)], [Some(1.0), Some(0.5)]);
+        let decades = Axis::log("", (f64::MIN_POSITIVE, f64::MAX));
+        assert!((2..9).contains(&decades.ticks().len()), "{:?}", decades.ticks());
     }
 
     #[test]

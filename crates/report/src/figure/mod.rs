@@ -20,7 +20,7 @@ pub(crate) use thin::{corners, finite_runs, on_grid, thin};
 
 /// How strongly one of several bands over each other is drawn: the more there are, the paler.
 pub(crate) fn band_opacity(bands: usize) -> f64 {
-    0.35 / (bands.max(1) as f64 + 0.6)
+    (0.44 / bands.max(1) as f64).clamp(0.12, 0.22)
 }
 
 /// Smallest and largest finite value.

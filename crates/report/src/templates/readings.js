@@ -53,8 +53,6 @@
       head.textContent = `${data.time_s[index].toFixed(2)} s${data.unit ? `, values in ${data.unit}` : ""}`;
       box.replaceChildren(head, ...rows);
       box.hidden = false;
-      box.classList.toggle("before", x > (left + right) / 2);
-      box.style.setProperty("--at", x / svg.viewBox.baseVal.width);
     };
     const nearest = (event) => {
       const area = svg.getBoundingClientRect();

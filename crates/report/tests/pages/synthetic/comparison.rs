@@ -290,7 +290,11 @@ fn statements() -> Vec<Statement> {
             agreement,
             condition: if agreement == Agreement::AgreesOnlyIf { text(condition) } else { String::new() },
             figure: (k % 5 != 4).then(|| text(figures[k % 6])),
-            command: if k % 3 == 0 { format!("autotune compare --only statement-{}", k + 1) } else { String::new() },
+            command: if k.is_multiple_of(3) {
+                format!("autotune compare --only statement-{}", k + 1)
+            } else {
+                String::new()
+            },
         }
     };
     (0..14).map(one).collect()
