@@ -161,8 +161,8 @@ fn the_answer_to_a_push_is_that_of_the_rows() {
         let peak = rows.iter().map(|row| (row.q - row.goal).amax()).fold(0.0, f64::max);
         // The comparison looks each 5 ms.
         assert!((peak / told("peak_deviation_rad") - 1.0).abs() < 2e-3, "{peak}");
-        let outside = rows.iter().filter(|row| (row.q - row.goal).amax() > 0.1 * peak).map(|row| row.t_s).last();
-        let back = outside.expect("a deviation") - 3.0;
+        let outside = rows.iter().rfind(|row| (row.q - row.goal).amax() > 0.1 * peak);
+        let back = outside.expect("a deviation").t_s - 3.0;
         assert!((back - told("recovery_s")).abs() < 0.02, "{back}");
     }
 }

@@ -28,6 +28,8 @@ pub fn run(args: &CompareArgs, context: Context) -> Result<Exit, Error> {
     let robot = catalogue::robot(&args.robot.robot, args.robot.tip.as_deref())?;
     let seed = args.seed.unwrap_or(DEFAULT_SEED);
     let inputs = inputs(args, robot, seed)?;
+    // Before a folder is made.
+    inputs.check()?;
     let folder =
         args.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(run_name(&inputs.robot, "compare", seed)));
     output::prepare_folder(&folder)?;
@@ -59,10 +61,11 @@ pub fn run(args: &CompareArgs, context: Context) -> Result<Exit, Error> {
 fn inputs(args: &CompareArgs, robot: Robot, seed: u64) -> Result<Inputs, Error> {
     let preset = |name: &str| GainsSource::find(name).map(|source| source.gains.gains);
     let given = |name: Option<&String>| name.map(|name| preset(name)).transpose();
-    let scenario = |name: &str| catalogue::scenario(Some(name), &robot);
+    // The scenarios are the Panda's; whether the robot is one is for the comparison to say.
+    let approximated = Robot::panda_cuboid();
+    let scenario = |name: &str| catalogue::scenario(Some(name), &approximated);
     let space = |controller| catalogue::space(None, Some(controller)).map(|source| source.space);
     Ok(Inputs {
-        approximated: Robot::panda_cuboid(),
         published: Published {
             aic_simulation: preset("pezzato2020-simulation")?,
             aic_robot: preset("pezzato2020-libfranka")?,
@@ -80,6 +83,7 @@ fn inputs(args: &CompareArgs, robot: Robot, seed: u64) -> Result<Inputs, Error> 
         spaces: Spaces { aic: space(ControllerName::Aic)?, mrac: space(ControllerName::Mrac)? },
         size: Size { seed, ..Size::default() },
         robot,
+        approximated,
     })
 }
 
