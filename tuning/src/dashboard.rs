@@ -219,7 +219,7 @@ impl View {
     /// A line for each free gain: its bounds, the latest candidates between them, the best one, and how far the latest spread.
     fn gains(&self, frame: &mut Frame<'_>, area: Rect) {
         let best = self.best.as_ref().map(|best| self.space.encode(&best.gains)).unwrap_or_default();
-        let width = usize::from(area.width.saturating_sub(62)).clamp(10, 120);
+        let width = usize::from(area.width.saturating_sub(64)).clamp(10, 120);
         let lines = self.space.knobs().iter().enumerate().map(|(knob, what)| {
             let mut strip = vec!['─'; width];
             let at = |place: f64| ((place * width as f64) as usize).min(width - 1);
@@ -267,7 +267,7 @@ fn chart(frame: &mut Frame<'_>, area: Rect, title: &str, along: &str, points: &[
     let (x, y) = (span(|point| point.0), span(|point| point.1));
     let curve =
         Dataset::default().marker(Marker::Braille).graph_type(GraphType::Line).style(Style::new().cyan()).data(&shown);
-    let x = Axis::default().bounds(x).labels(x.map(|bound| format!("{bound:.0} {along}")));
+    let x = Axis::default().bounds(x).labels(x.map(|bound| format!("{:.0} {along}", bound.round() + 0.0)));
     let y = Axis::default().bounds(y).labels(y.map(|bound| format!("{bound:.4}")));
     frame.render_widget(Chart::new(vec![curve]).block(block).x_axis(x).y_axis(y), area);
 }
