@@ -23,19 +23,7 @@ struct Page {
     html: String,
 }
 
-const REPORT: &[&str] = &[
-    "answer",
-    "asked",
-    "gains",
-    "response",
-    "held-out",
-    "search",
-    "sensitivity",
-    "learnt",
-    "certificate",
-    "recheck",
-    "method",
-];
+const REPORT: &[&str] = &synthetic::SECTIONS;
 const FRONT: &[&str] = &["front", "points", "pick", "method"];
 const COMPARISON: &[&str] = &["answer", "controllers", "statements", "findings", "replay", "repeat", "method"];
 

@@ -5,20 +5,6 @@ use certune_report::{Grade, ReportError, TuningReport, Verdict, tuning_report};
 use crate::markup::{balanced, colours_have_rules, keep_for_a_look, words};
 use crate::synthetic;
 
-const SECTIONS: [&str; 11] = [
-    "answer",
-    "asked",
-    "gains",
-    "response",
-    "held-out",
-    "search",
-    "sensitivity",
-    "learnt",
-    "certificate",
-    "recheck",
-    "method",
-];
-
 fn page(record: &TuningReport) -> String {
     let html = tuning_report(record).unwrap();
     assert_eq!(balanced(&html).map(|count| count > 100), Ok(true));
@@ -30,7 +16,7 @@ fn page(record: &TuningReport) -> String {
 fn the_page_is_complete_small_and_loads_nothing() {
     let html = page(&synthetic::record());
     keep_for_a_look(&html, "report");
-    for section in SECTIONS {
+    for section in synthetic::SECTIONS {
         assert!(html.contains(&format!("<section id=\"{section}\"")), "{section}");
         assert!(section == "answer" || html.contains(&format!("href=\"#{section}\"")), "{section}");
     }

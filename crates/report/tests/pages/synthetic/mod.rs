@@ -5,6 +5,21 @@ pub mod comparison;
 
 use certune_report::*;
 
+/// The ids of the sections that the page of a tuning run has, whatever its record.
+pub const SECTIONS: [&str; 11] = [
+    "answer",
+    "asked",
+    "gains",
+    "response",
+    "held-out",
+    "search",
+    "sensitivity",
+    "learnt",
+    "certificate",
+    "recheck",
+    "method",
+];
+
 const GOALS: [[f64; 7]; 5] = [A, B, C, B, A];
 const A: [f64; 7] = [1.0, 0.5, 0.0, -2.0, 0.0, 2.5, 0.0];
 const B: [f64; 7] = [0.0, 0.2, 0.0, -1.0, 0.0, 1.2, 0.0];
